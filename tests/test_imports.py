@@ -141,7 +141,8 @@ def test_a_file_imports_only_what_its_wing_may(file: Path) -> None:
         return
     if wing == "__main__":
         assert {name for name in imports_of(file) if name.startswith("tfcompose")} == {
-            "tfcompose.cli"
+            "tfcompose.cli",
+            "tfcompose.launcher.program",
         }
         return
     for name in imports_of(file):

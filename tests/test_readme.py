@@ -12,13 +12,13 @@ from PIL import Image
 from tests.benchmarks import pages, record
 from tests.support import pictures, processes
 from tests.support.cli import tfcompose_in
-from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.compiling import library
 from tfcompose.cli.documentation import FOLDER, for_terminal, page, topic, topics
 from tfcompose.cli.parser import all_commands, parser_of
 from tfcompose.cli.terminal import plain
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tool import shipped
+from tfcompose.launcher.program import PROCESSES
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -7,17 +7,6 @@ nothing is imported before that folder is off the path (Python 3.10 has no ``-P`
 
 import sys
 
-#: The processes of tfcompose's own, by the kind that plans and supervisors name, with the module
-#: whose ``main`` each runs. Everything else is a command.
-PROCESSES = {
-    "static": "tfcompose.launcher.publishers.static",
-    "joints": "tfcompose.launcher.publishers.joints",
-    "simulate": "tfcompose.launcher.publishers.simulate",
-    "guard": "tfcompose.guard.start",
-    "exec": "tfcompose.launcher.exec",
-    "rehearse": "tfcompose.launcher.rehearse",
-}
-
 
 def main() -> int:
     """Run the program, started as a script or with ``-m``, and return the exit code."""
@@ -32,12 +21,10 @@ def run() -> int:
     sys.path[:] = [folder for folder in sys.path if folder not in dropped]
     if "tfcompose" not in sys.modules:
         _load_package()
-    kind, *arguments = sys.argv[1:] or [""]
-    if kind in PROCESSES:
-        from importlib import import_module
+    from tfcompose.launcher.program import PROCESSES, run_process
 
-        code: int = import_module(PROCESSES[kind]).main(arguments)
-        return code
+    if sys.argv[1:2] and sys.argv[1] in PROCESSES:
+        return run_process()
     from tfcompose.cli import main as run_command
 
     return run_command()

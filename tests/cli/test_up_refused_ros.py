@@ -49,6 +49,16 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_a_middleware_that_is_missing_is_named_before_ros_is_imported() -> None:
+    """ROS ends who imports it then."""
+    done = processes.run(
+        [sys.executable, "-m", "tfcompose", "up"],
+        env=os.environ | {"RMW_IMPLEMENTATION": "rmw_none_cpp"},
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert [line.split()[0] for line in done.stderr.splitlines()] == ["error[TF901]", "help:"]
+
+
 def test_settle_without_a_guard_is_wrong_use() -> None:
     assert "--settle" in tfcompose("up", "--guard", "off", "--settle", "1", code=2).stderr
 

@@ -116,6 +116,21 @@ def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
     assert "Traceback" not in robot.text
 
 
+def test_own_processes_are_forked_from_the_launcher_and_end_with_it(
+    up: Callable[..., RunningRobot],
+) -> None:
+    robot = up(ROVER)
+    robot.says("tree complete")
+    own = robot.below()
+    # The kernel gives each program that is executed random bytes at an address of its own.
+    vector = Path(f"/proc/{robot.popen.pid}/auxv").read_bytes()
+    forked = [one for one in own if Path(f"/proc/{one.pid}/auxv").read_bytes() == vector]
+    assert {process.cmdline()[2] for process in forked} >= {"guard", "static"}
+    assert all(process.environ()["TFCOMPOSE_RUN"] for process in forked)
+    robot.popen.kill()
+    assert until(lambda: all(map(gone, own)))
+
+
 def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_once(
     up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:

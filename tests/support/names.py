@@ -12,12 +12,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.documentation import TOPICS
 from tfcompose.cli.parser import COMMANDS
 from tfcompose.cli.schemas import LANGUAGES
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tool import shipped
+from tfcompose.launcher.program import PROCESSES
 from tfcompose.spec.language.robot import RobotSpec
 
 FILE = Path(__file__).parents[2] / "tfcompose" / "data" / "names.json"

@@ -53,8 +53,10 @@ from tfcompose.cli.terminal import (
 )
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.launcher.child import end_with
+from tfcompose.launcher.forking import Forker
 from tfcompose.launcher.output import Logs, NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of
+from tfcompose.launcher.program import load_shared, run_process
 from tfcompose.launcher.run_files import RunFiles
 from tfcompose.launcher.runtime_dir import (
     Lock,
@@ -82,9 +84,23 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
 
 
+def load_forker(arguments: Namespace) -> Forker | None:
+    """Load what tfcompose's own processes run; None where ROS does not load, or nothing starts.
+
+    ROS ends a process that imports it without the middleware that the environment names.
+    """
+    if arguments.update or ros_trouble(os.environ):
+        return None
+    try:
+        return Forker(load_shared, run_process)
+    except ImportError:  # they say what is missing
+        return None
+
+
 def start(
     file: Path,
     arguments: Namespace,
+    forker: Forker | None = None,
     built_with: Sequence[Finding] = (),
     events: EventStream | None = None,
 ) -> int:
@@ -92,7 +108,8 @@ def start(
 
     Return the exit code as ``up`` does.
 
-    ``built_with`` are the warnings of its build, which were printed. ``events`` gets each notice.
+    ``forker`` has loaded what tfcompose's own processes run. ``built_with`` are the warnings of
+    the plan's build, which were printed. ``events`` gets each notice.
     """
     plan = plan_to_start(read_built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
@@ -109,13 +126,17 @@ def start(
         fail(f"the run cannot be recorded: {error}", UNREADABLE)
     with ExitStack() as stack:
         stack.callback(lock.close)
-        if arguments.update:
+        if arguments.update or ros_trouble(os.environ):
             fail(f"{place.name} does not run, and up --update starts nothing")
         if hidden := hidden_run(place):
             fail(hidden)
         copy = copy_plan(plan, file, place, alone=True)
         session = RunSession(
-            copy, RunFiles(place, lock, copy), file.absolute().parent, events=events
+            copy,
+            RunFiles(place, lock, copy),
+            file.absolute().parent,
+            forker=forker,
+            events=events,
         )
         warnings = warnings_before_start(place, plan, session.run_id)
         for warning in warnings:

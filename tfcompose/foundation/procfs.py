@@ -15,6 +15,15 @@ from typing import NamedTuple
 PROC = "/proc"
 #: A process's score when memory runs out.
 OOM_SCORE = f"{PROC}/self/oom_score_adj"
+#: The fields of stat that hold addresses, counted after the name.
+_MEMORY_PARTS = {
+    "start_code": 23,
+    "end_code": 24,
+    "start_stack": 25,
+    "start_data": 42,
+    "end_data": 43,
+    "start_brk": 44,
+}
 
 
 class Stat(NamedTuple):
@@ -46,6 +55,12 @@ def stat(pid: int | str) -> Stat:
     )
 
 
+def memory_parts() -> dict[str, int]:
+    """Return the addresses of this process's code, data and stack, as prctl(2) names them."""
+    fields = _read("self", "stat").rpartition(b")")[2].split()
+    return {name: int(fields[at]) for name, at in _MEMORY_PARTS.items()}
+
+
 def environ(pid: int | str) -> dict[str, str]:
     """Return the environment that the process was started with."""
     pairs = (entry.partition("=") for entry in _words(pid, "environ"))
@@ -60,6 +75,12 @@ def argv(pid: int | str) -> list[str]:
 def has_loaded(pid: int | str, library: str) -> bool:
     """Return whether the process has a file of that name, or a part of it, in its memory."""
     return library.encode() in _read(pid, "maps")
+
+
+def mapped_files() -> list[str]:
+    """Return the files that this process has in its memory."""
+    lines = (line.split(None, 5) for line in _read("self", "maps").decode().splitlines())
+    return sorted({fields[5] for fields in lines if len(fields) > 5})  # noqa: PLR2004 (the sixth)
 
 
 def memory_bytes(pid: int | str) -> int:
@@ -83,9 +104,9 @@ def kernel_number(name: str) -> int | None:
         return None
 
 
-def threads() -> int:
-    """Return how many threads this process has."""
-    return os.stat(f"{PROC}/self/task").st_nlink - 2  # noqa: PTH116 (imports less)
+def threads(pid: int | str = "self") -> int:
+    """Return how many threads the process has."""
+    return os.stat(f"{PROC}/{pid}/task").st_nlink - 2  # noqa: PTH116 (imports less)
 
 
 def descriptors() -> list[int]:

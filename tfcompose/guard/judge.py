@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 #: A guard that follows one that died misses no publisher for this long: it has to find all nodes
 #: again.
 FINDING_S = 5.0
+#: A tree that is not complete after this long is no longer waited for, in seconds.
+STARTING_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,10 +124,17 @@ class Judge:
         self.ledger.judge(judged, message, now)
         return judged.admitted
 
-    @property
-    def has_begun(self) -> bool:
-        """Whether the observation before the start is over."""
-        return self._start.cleared is not None
+    def is_starting(self, now: float) -> bool:
+        """Return whether others wait for what it reports: until the tree is complete, or late."""
+        cleared = self._start.cleared
+        return cleared is None or (now - cleared < STARTING_S and not self.live.is_complete)
+
+    def next_tick(self, now: float, every_s: float) -> float:
+        """Return when ``tick`` is due: the end of the observation is not passed by."""
+        end = self.begun + self.settle_s
+        return (
+            min(now + every_s, end) if self._start.cleared is None and end > now else now + every_s
+        )
 
     @property
     def compared(self) -> frozenset[str]:
@@ -194,7 +203,7 @@ class Judge:
             silence = self.live.judge(now, self.clocks.speed(now), paused=self.clocks.stands(now))
             return [*events, *silence, *replaced, *over]
         self.live.tick(now)
-        if now - self.begun >= self.settle_s and self.ledger.is_settled:
+        if now >= self.begun + self.settle_s and self.ledger.is_settled:
             self.ledger.clear(now)
             events.append(Clear())
         return events

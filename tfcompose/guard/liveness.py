@@ -231,6 +231,11 @@ class Liveness:
         self._wrong: dict[str, WrongEdges] = {}
         self._watched = WatchedTime()
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether all planned edges have been live since an owner was last stopped on purpose."""
+        return self._complete
+
     def follow(self, plan: Plan) -> None:
         """Follow a plan that differs in its edges' lines, and in poses of fixed ones."""
         planned = {edge.child: edge for edge in plan.edges}

@@ -156,7 +156,8 @@ class TopicWatch:
     @property
     def gather_s(self) -> float:
         """How long messages may gather before the next step, in seconds."""
-        is_prompt = self.relay is not None or not self.judge.has_begun or self._flood.is_reading
+        is_prompt = self.relay is not None or self._flood.is_reading
+        is_prompt = is_prompt or self.judge.is_starting(time.monotonic())
         return gather_s(self._number_taken, is_prompt=is_prompt)
 
     def close(self) -> None:
@@ -184,7 +185,7 @@ class TopicWatch:
             self._judge(self._read(declared, now), now)
         # What is under way waits for a check no longer than it must.
         if now >= self._due + (LATE_S if fenced else 0.0):
-            self._due = now + CHECK_EVERY_S
+            self._due = self.judge.next_tick(now, CHECK_EVERY_S)
             if not strangers:  # else it was asked for them
                 self._ask_graph(now)
             if self._clock:

@@ -18,7 +18,7 @@ import termios
 import time
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.foundation.signals import SIGNALS
 from tfcompose.launcher.kernel_settings import apply_settings
@@ -219,7 +219,7 @@ class Child:
     """A running process, its pipes, and the end of what it wrote to each."""
 
     name: str
-    popen: subprocess.Popen[bytes]
+    popen: Running
     pipes: list[Pipe] = field(default_factory=list)
     last_out: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
     last_err: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
@@ -230,6 +230,25 @@ class Child:
     def last_lines(self) -> tuple[str, ...]:
         """Its last lines of output, stderr last, because two pipes have no common order."""
         return (*self.last_out, *self.last_err)[-LAST_LINES:]
+
+
+class Running(Protocol):
+    """A process that was started: ``subprocess.Popen`` is one."""
+
+    @property
+    def pid(self) -> int:
+        """The process's number, which is its group's too."""
+
+    @property
+    def stdout(self) -> IO[bytes] | FileIO | None:
+        """The pipe of its output."""
+
+    @property
+    def stderr(self) -> IO[bytes] | FileIO | None:
+        """The pipe of its errors."""
+
+    def wait(self) -> int:
+        """Wait for its end; return its exit code, or the negative number of a signal."""
 
 
 def spawn(command: ChildCommand, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:

@@ -51,8 +51,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from selectors import BaseSelector
 
-    from tfcompose.launcher.child import ChildCommand
+    from tfcompose.launcher.child import ChildCommand, Running
     from tfcompose.launcher.events import Event
+    from tfcompose.launcher.forking import Forker
     from tfcompose.model.messages import GuardOrder, Notice, Stream
     from tfcompose.model.plan import PlanProcess
 
@@ -72,16 +73,19 @@ class Children:
 
     ``writer`` says, of a process and a line that it wrote, whose line it is: a container writes
     its components'. With a run's id, what they leave behind is this process's to reap and to end.
+    What ``forker`` can start is forked; all else is executed.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913, PLR0917 (made in one place)
         self,
         selector: BaseSelector,
         run_id: str,
         happened: Callable[[Event], None],
         notify: Callable[[Notice], None],
         writer: Callable[[str, str], str],
+        forker: Forker | None = None,
     ) -> None:
+        self._forker = forker
         self._writer = writer
         self._selector = selector
         self._run_id = run_id
@@ -246,9 +250,13 @@ class Children:
         if command.fence:
             command.fence[0].parent.mkdir(exist_ok=True)
             command.fence[0].write_text(command.fence[1], encoding="utf-8")
-        popen = spawn(
-            replace(command, env=command.env | more), guard.theirs if guard else pass_fds
-        )
+        marked = replace(command, env=command.env | more)
+        passed = guard.theirs if guard else pass_fds
+        popen: Running
+        if self._forker and self._forker.can_start(marked):
+            popen = self._forker.start(marked, passed)
+        else:
+            popen = spawn(marked, passed)
         child = Child(process.name, popen)
         self._children[process.name] = child
         self._update_reaper()

@@ -53,6 +53,11 @@ def check_settings(process: PlanProcess) -> list[Finding]:
     return [refusal for refusal in refusals if refusal]
 
 
+def has_settings(process: PlanProcess) -> bool:
+    """Return whether the plan has the kernel hold the process in some way."""
+    return any(_set(process))
+
+
 def _set(process: PlanProcess) -> Iterator[tuple[KernelSetting, Any]]:
     """Yield the settings that the process has, with their values."""
     for setting in SETTINGS:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,23 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 PYTHON_PATH = "PYTHONPATH"
+#: The processes of tfcompose's own, by the kind that plans and supervisors name, with the module
+#: whose ``main`` each runs. Everything else is a command.
+PROCESSES = {
+    "static": "tfcompose.launcher.publishers.static",
+    "joints": "tfcompose.launcher.publishers.joints",
+    "simulate": "tfcompose.launcher.publishers.simulate",
+    "guard": "tfcompose.guard.start",
+    "exec": "tfcompose.launcher.exec",
+    "rehearse": "tfcompose.launcher.rehearse",
+}
+#: What several of them import once they handle signals.
+SHARED_MODULES = (
+    "tfcompose.guard.process",
+    "tfcompose.launcher.publishers.description",
+    "tfcompose.launcher.publishers.simulate",
+    "tfcompose.launcher.publishers.static",
+)
 #: What starts the program on this machine, with the installation that runs now.
 HERE = (sys.executable, str(Path(__file__).absolute().parents[1] / "__main__.py"))
 #: The code that starts the program where only a Python that has tfcompose is known: it looks for
@@ -23,6 +41,23 @@ ANYWHERE_PARTS = (
     " from tfcompose.__main__ import run; sys.exit(run())",
 )
 ANYWHERE = "".join(ANYWHERE_PARTS)
+
+
+def run_process() -> int:
+    """Run the process that the command line names, and return its exit code."""
+    code: int = import_module(PROCESSES[sys.argv[1]]).main(sys.argv[2:])
+    return code
+
+
+def load_shared() -> None:
+    """Import what the processes share, and initialise nothing of ROS.
+
+    Raises:
+        ImportError: if ROS cannot be imported.
+    """
+    for module in SHARED_MODULES:
+        import_module(module)
+    import_module("tfcompose.tf.ros.node").load_types()
 
 
 def anywhere(python: str) -> list[str]:

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from tfcompose.launcher.answers import Answer
     from tfcompose.launcher.child import ChildCommand
     from tfcompose.launcher.events import Action, Event
+    from tfcompose.launcher.forking import Forker
     from tfcompose.launcher.output import EventStream, NonBlockingOutput
     from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.run_files import RunFiles
@@ -90,6 +91,7 @@ class RunSession:
     ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With files,
     what the run's processes leave behind is ended with it, also what left their groups.
     ``refresh`` is called now and then. ``events`` gets each notice; the run ends with its reader.
+    ``forker`` has loaded what tfcompose's own processes run.
     """
 
     plan_file: Path
@@ -98,6 +100,7 @@ class RunSession:
     output: NonBlockingOutput | None = None
     refresh: Callable[[], None] | None = None
     events: EventStream | None = None
+    forker: Forker | None = None
 
     @property
     def run_id(self) -> str:
@@ -197,7 +200,12 @@ class _Supervisor:
         if session.run_id:
             stack.enter_context(subreaper())
         self._children = Children(
-            selector, session.run_id, self._handle, self._notify, self._writer
+            selector,
+            session.run_id,
+            self._handle,
+            self._notify,
+            self._writer,
+            forker=session.forker,
         )
         stack.callback(self._children.close)
 
@@ -228,7 +236,10 @@ class _Supervisor:
         return self._exit_code
 
     def _prepare(self) -> None:
-        """Have as many publishers as there are cores join ROS while the guard looks."""
+        """Have publishers join ROS while the guard looks.
+
+        Where each has to import ROS first, as many as there are cores.
+        """
         if self._state.clear is not None or self._state.stop:
             return
         own = [
@@ -236,7 +247,8 @@ class _Supervisor:
             for tracked in self._state.tracked.values()
             if tracked.process.kind in _PREPARED
         ]
-        for process in [process for process in own if not process.after][: os.cpu_count() or 1]:
+        at_once = None if self._session.forker else os.cpu_count()
+        for process in [process for process in own if not process.after][:at_once]:
             self._children.prepare(process, self._commands[process.name])
 
     def _answer(self, request: Request) -> Answer:

@@ -440,7 +440,9 @@ def test_other_robots_in_the_same_domain_are_reported(nodes: FakeNodes) -> None:
 
 
 OTHER_RMW = """
-import mmap, sys, time
+import mmap, sys, threading, time
+for _ in range(4):  # each middleware has more
+    threading.Thread(target=time.sleep, args=[60], daemon=True).start()
 with open(sys.argv[1], "rb") as file:
     library = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     print("up", flush=True)
@@ -451,7 +453,7 @@ with open(sys.argv[1], "rb") as file:
 def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
     """ROS's wheels bring one middleware, and a node that asks for another ends.
 
-    What has rcl mapped stands for it.
+    What has rcl mapped, and threads, stands for it.
     """
     rcl = next(
         path

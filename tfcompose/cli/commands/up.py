@@ -134,16 +134,17 @@ def run(arguments: Namespace) -> int:
         reject([missing])
     events = _open_events(arguments.events)
     if is_plan(arguments.file):
-        from tfcompose.cli.starting import start
+        from tfcompose.cli.starting import load_forker, start
 
-        return start(Path(arguments.file), arguments, events=events)
+        return start(Path(arguments.file), arguments, load_forker(arguments), events=events)
     from tfcompose.cli.build_process import BuildProcess
 
     with BuildProcess(arguments) as build:
-        from tfcompose.cli.starting import start  # while it is built
+        from tfcompose.cli.starting import load_forker, start  # while it is built
 
+        forker = load_forker(arguments)
         plan_file, found = build.wait_until_built()
-    return start(plan_file, arguments, found, events)
+    return start(plan_file, arguments, forker, found, events)
 
 
 def _open_events(path: str | None) -> EventStream | None:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.context import Context
 from rclpy.exceptions import InvalidParameterTypeException, NameValidationException
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -26,6 +27,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rclpy.type_support import check_for_type_support
 from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
@@ -148,6 +150,14 @@ def _node(context: Context, name: str, namespace: str) -> Any:
         start_parameter_services=False,
         parameter_overrides=[parameter("start_type_description_service", value=False)],
     )
+
+
+def load_types() -> None:
+    """Load what messages of every own process are made with, as their first publisher would."""
+    tf_message_type()
+    load: Any = check_for_type_support  # rclpy does not say the types of its arguments
+    for message in (String, ParameterEvent):
+        load(message)
 
 
 def middleware() -> str:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 _LIBRARY = "librcl.so"
+#: Every middleware has threads. A process that has only loaded ROS, as a launcher for those that
+#: it forks, has its own, and two of LTTng's.
+_FEWEST_THREADS = 4
 _PREFIXES = ("ROS_", "RMW_")
 #: Of a command line so much is shown.
 _SHOWN = 100
@@ -32,7 +35,7 @@ def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
         if pid == os.getpid():
             continue
         try:
-            if not procfs.has_loaded(pid, _LIBRARY):
+            if procfs.threads(pid) < _FEWEST_THREADS or not procfs.has_loaded(pid, _LIBRARY):
                 continue
             variables, command = (
                 ros_variables(procfs.environ(pid)),

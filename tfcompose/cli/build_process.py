@@ -1,4 +1,4 @@
-"""A build in a process of its own.
+"""A build in a separate process.
 
 The launcher, which lives as long as the robot runs, never holds the compiler.
 """

@@ -33,10 +33,10 @@ class _Formatter(HelpFormatter):
 
 
 class Parser(ArgumentParser):
-    """Names the option that was probably meant, and where the help is."""
+    """Parser that suggests the nearest option and names the help."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and exit with 2."""
+        """Print the error and exit with 2."""
         import difflib
 
         advice = f"{self.prog} --help lists what there is"

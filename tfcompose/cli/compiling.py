@@ -77,11 +77,11 @@ class PresetFolders:
     allows: Callable[[str], bool] = lambda _: True
 
     def has(self, path: str) -> bool:
-        """Return whether the file is there."""
+        """Return whether the file exists."""
         return self.allows(path) and is_file(path)
 
     def is_folder(self, path: str) -> bool:
-        """Return whether the folder is there."""
+        """Return whether the folder exists."""
         return self.allows(path) and is_folder(path)
 
     def read(self, path: str) -> str:
@@ -140,7 +140,7 @@ def _ament_prefixes() -> tuple[str, ...]:
 
 
 def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) -> list[Source]:
-    """Return what --overlay and --set lay over a robot, in that order.
+    """Return the overlays of --overlay and --set, in that order.
 
     ``read`` gives a file's text.
 
@@ -157,7 +157,7 @@ def disk_of(file: str, arguments: Namespace) -> Disk:
 
 
 def inputs_of(arguments: Namespace) -> Given:
-    """Return what the command line and the environment give the robot.
+    """Return the robot's inputs from command line and environment.
 
     Raises:
         SystemExit: after saying what is wrong with ROS arguments.
@@ -178,7 +178,7 @@ def compile_or_exit(file: str, arguments: Namespace) -> Robot:
 
 
 def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Compiled]:
-    """Return the robot, and what it was compiled to; warnings are printed.
+    """Return the robot and its compiled files; print warnings.
 
     Raises:
         SystemExit: after printing what is wrong with it.
@@ -204,7 +204,7 @@ def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Com
 
 
 def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]:
-    """Return the edges from ``a`` up to where the ways meet, and those from ``b`` up to there.
+    """Return the edges from ``a`` and from ``b`` up to their common ancestor.
 
     Raises:
         SystemExit: after saying that a frame is not there, or that nothing connects the two.
@@ -308,7 +308,7 @@ def moments(path: str, scale: Vector) -> Moments:
 
 
 def print_output(file: str, text: str) -> None:
-    """Print what a file had printed while it was read.
+    """Print the output of a file that was run to read it.
 
     Each line with the file's name, on stderr.
     """
@@ -324,7 +324,7 @@ _NOT_HELD = {
 
 
 def report_missing_confinement(missing: Sequence[str]) -> None:
-    """Print, once for each, what the kernel does not have to confine what files run."""
+    """Print the missing sandbox features of the kernel, once each."""
     for feature in missing:
         if feature not in _reported:
             _reported.add(feature)

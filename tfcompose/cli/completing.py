@@ -39,7 +39,7 @@ PATHS = frozenset({"FILE", "DIR", "FOLDER", "BAG", "PICTURE", "PLAN", "OLD", "NE
 
 
 def complete(commands: Mapping[str, CommandModule]) -> None:
-    """Print what the argument at the shell's cursor can be, and exit.
+    """Print completions of the argument at the shell's cursor, and exit.
 
     Raises:
         SystemExit: always, with 0.
@@ -84,7 +84,7 @@ class _Completer:
         self._is_list = action.metavar == "CODES"
 
     def __call__(self, prefix: str, **_: object) -> list[str]:
-        """Return what the argument can be; of a list with commas, what its last part can be."""
+        """Return completions of the argument; for a list with commas, those of its last part."""
         first, comma, _last = prefix.rpartition(",") if self._is_list else ("", "", prefix)
         names = [f"{first}{comma}{name}" for name in self._source(self._argv)]
         return [*names, *FilesCompleter()(prefix)] if self._is_path else names

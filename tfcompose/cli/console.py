@@ -64,12 +64,12 @@ STATUS_NAMED_AT_MOST = 3
 
 
 def prefix_of(name: str, width: int) -> str:
-    """Return what stands before each line of the process."""
+    """Return the prefix of each line of the process."""
     return f"{name:<{width}} |"
 
 
 class Output(Protocol):
-    """Where lines go; ``log`` says that a process wrote it."""
+    """Destination of lines; ``log``: a process wrote it."""
 
     def write(self, text: str, *, log: bool = False) -> None:
         """Write the text.
@@ -135,7 +135,7 @@ class Console:
         }
 
     def __call__(self, notice: Notice) -> None:
-        """Write what a notice says, at once.
+        """Write the lines of a notice, at once.
 
         Raises:
             OSError: if nobody reads any more.
@@ -309,7 +309,7 @@ class Console:
         keep: bool = True,
         is_rendered: bool = False,
     ) -> None:
-        """Write a line; of one that is not rendered here only colours are left."""
+        """Write a line; keep only colours of lines from other programs."""
         fault = self._kept(name, text) if keep else None
         clear = self._status.cleared() if self._status else ""
         shown = text
@@ -330,7 +330,7 @@ class Console:
 
 
 def describe_changes(change: PlanChange | Replanned, labels: Sequence[str]) -> str:
-    """Return the processes that another plan changes, adds, removes and describes anew.
+    """Return the processes that another plan changes, adds, removes or gives a new description.
 
     Each group has its label, in this order; empty if nothing has to be restarted.
     """
@@ -344,7 +344,7 @@ def describe_changes(change: PlanChange | Replanned, labels: Sequence[str]) -> s
 
 
 def describe_vanished(edges: tuple[str, ...]) -> str:
-    """Return what is to be said of fixed edges that vanished."""
+    """Return the warning about fixed edges that vanished."""
     named = listed(edges, NAMED_AT_MOST)
     return (
         f"running listeners keep {named}: tf2 never forgets a fixed frame; restart RViz and other"
@@ -389,7 +389,7 @@ class StatusLine:
         self._at = 0.0
 
     def take(self, notice: Notice) -> None:
-        """Count what the notice says."""
+        """Count the notice."""
         if isinstance(notice, ProcessState):
             self._states[notice.process] = notice.state
             if notice.state not in ("running", "expected", "stopping"):
@@ -406,12 +406,12 @@ class StatusLine:
             self._ended = True
 
     def cleared(self) -> str:
-        """Return what takes the line away, so that others can be written in its place."""
+        """Return the control sequence that clears the line."""
         self._shown = ""
         return CLEAR_LINE if self._drawn else ""
 
     def draw(self) -> str:
-        """Return what draws the line anew.
+        """Return the control sequence that redraws the line.
 
         Nothing where that would change nothing, or was done a moment ago.
         """
@@ -437,7 +437,7 @@ class StatusLine:
         return text if len(text) <= columns else f"{text[: columns - 1]}…"
 
     def _parts(self, processes: str, edges: str, of: str) -> list[str]:
-        """Return findings, running processes, live edges, and what is missing."""
+        """Return findings, running processes, live edges, and missing edges."""
         wrong = [
             f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count
         ]

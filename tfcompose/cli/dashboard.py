@@ -108,7 +108,7 @@ class _Scroll:
     room: int = 1
 
     def move(self, lines: int) -> None:
-        """Go that many lines up, or down where negative."""
+        """Scroll up by this many lines; down if negative."""
         self.back = max(self.back + lines, 0)
 
     def window(self, count: int, room: int) -> slice:
@@ -166,7 +166,7 @@ class Dashboard:
     # What happens.
 
     def take(self, notice: Notice, at: float) -> None:
-        """Learn what a notice says, and when."""
+        """Take a notice and its time."""
         self._at = at
         self._console(notice)
         if isinstance(notice, FindingShown):
@@ -185,7 +185,7 @@ class Dashboard:
             self.ended = notice
 
     def forget(self) -> None:
-        """Forget what notices said: they are going to come again."""
+        """Forget all notices: they will be sent again."""
         self._reports.clear()
         self._events.clear()
         self._events.extend(
@@ -196,7 +196,7 @@ class Dashboard:
             self.take(FindingShown(found), self._began)
 
     def add_log_lines(self, lines: Iterable[str]) -> None:
-        """Add lines to the log that is shown; where it was scrolled back, it stays in place."""
+        """Add lines to the log; keep the position if it is scrolled back."""
         before = len(self._log)
         added = 0
         for line in lines:
@@ -207,7 +207,7 @@ class Dashboard:
             scroll.move(added)
 
     def press(self, key: str) -> bool:
-        """Do what the key says; return whether the robot is to be ended."""
+        """Handle a key; return whether to stop the robot."""
         confirmed, self._confirming = self._confirming and key == "q", False
         if confirmed:
             return True
@@ -391,7 +391,7 @@ class Dashboard:
         return found
 
     def _news(self) -> list[Text]:
-        """Return the first line of each report; where there is none, what the launcher said."""
+        """Return the first line of each report, or the launcher's lines if there is none."""
         if self._reports:
             return [self._timed(report.at, report.lines[0]) for report in self._reports]
         return [self._timed(at, _style_line(line)) for at, line in self._events]

@@ -71,7 +71,7 @@ def topic_groups() -> dict[str, dict[str, str]]:
 
 
 def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
-    """Return the page of a topic, a command's options with its page, or what a key means.
+    """Return the page of a topic, the options and page of a command, or the meaning of a key.
 
     A topic with the name of a key ends with the key. None if there is none.
     """
@@ -114,9 +114,9 @@ def for_terminal(markdown: str, columns: int, *, coloured: bool = False) -> str:
 
 
 def topic(name: str, *, with_reference: bool = True) -> str:
-    """Return the page of a topic as Markdown, with what the code knows.
+    """Return the page of a topic as Markdown, with its generated parts.
 
-    Without the reference, all keys and all codes are left out.
+    Without the reference, it omits all keys and all codes.
     """
     tool, _ = installed().topics().get(name, (None, None))
     text = _read(name, FOLDER if tool is None else tool.topic_folder)
@@ -125,7 +125,7 @@ def topic(name: str, *, with_reference: bool = True) -> str:
 
 
 def _options(name: str, command: CommandModule) -> str:
-    """Return the options of a command, with those that tools add to it."""
+    """Return the options of a command, including those of tools."""
     parser = command_parser(name, command)
     add_all_options(name, parser)
     return parser.format_help()

@@ -1,4 +1,4 @@
-"""``up --dry-run``: what would be started, for people who review it.
+"""``up --dry-run``: the processes of a plan, for review.
 
 The same plan gives the same text everywhere.
 """
@@ -111,7 +111,7 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
 
 
 def _what(process: PlanProcess) -> Iterator[str]:
-    """Yield what is started or loaded."""
+    """Yield the lines of processes and components."""
     component = process.component
     if component:
         yield f"  loads    {component.package}/{component.plugin}, in {component.container}"
@@ -120,7 +120,7 @@ def _what(process: PlanProcess) -> Iterator[str]:
 
 
 def _component(process: PlanProcess) -> Iterator[str]:
-    """Yield what a component is given."""
+    """Yield the parameters and remappings of a component."""
     component = process.component
     for name, value in component.params.items() if component else ():
         yield f"  param    {name}: {json.dumps(value)}"
@@ -128,7 +128,7 @@ def _component(process: PlanProcess) -> Iterator[str]:
 
 
 def _settings(keys: Iterable[ProcessKey], process: PlanProcess) -> Iterator[str]:
-    """Yield what is said of the process by these keys."""
+    """Yield the lines of the process for these keys."""
     for key in keys:
         for label, text in key.lines_of(process):
             yield f"  {label:<8} {text}"
@@ -164,7 +164,7 @@ def _times(process: PlanProcess) -> Iterator[str]:
 
 
 def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
-    """Return what is added to the environment."""
+    """Return the additions to the environment."""
     if process.kind in {"external", "component"}:
         return {}
     env = child_environment({}, plan.ros, own=process.kind != "run") | process.env

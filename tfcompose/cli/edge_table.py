@@ -141,7 +141,7 @@ def objects_of(
     now_ns: int,
     chain: FrameChain | str | None = None,
 ) -> str:
-    """Return one line of JSON: what was counted, and a list of edges.
+    """Return one line of JSON: counts and a list of edges.
 
     Times in seconds, stamps in nanoseconds.
     """
@@ -164,7 +164,7 @@ def objects_of(
 
 
 def object_of(state: EdgeState) -> dict[str, Any]:
-    """Return one edge for programs; what is not known is null."""
+    """Return one edge as JSON; unknown values are null."""
     stream, timing = state.stream, state.timing
     return {
         "parent": stream.parent,

@@ -112,7 +112,7 @@ class Fixer:
         return self._sound(file, self._sound(file, kept, todo[:half]), todo[half:])
 
     def _is_sound(self, file: str, fixed: list[Finding]) -> bool:
-        """Whether with these edits the findings are gone, and no others have come."""
+        """Whether these edits remove the findings and cause no others."""
         files = dict.fromkeys(
             [file, *(edit.span.file for finding in fixed for edit in finding.edits)]
         )
@@ -129,7 +129,7 @@ class Fixer:
         return not come and not _count_findings(fixed) - (before - after)
 
     def _apply_edits(self, fixed: list[Finding]) -> dict[str, str] | None:
-        """Return the new texts by file, or None where edits meet."""
+        """Return the new texts by file, or None if edits overlap."""
         by_file: dict[str, dict[Edit, None]] = {}
         for edit in (edit for finding in fixed for edit in finding.edits):
             by_file.setdefault(edit.span.file, {})[edit] = None
@@ -150,7 +150,7 @@ def _count_findings(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
 
 
 def rewrite(path: Path, old: str, new: str) -> None:
-    """Put the new text into the file, whole or not at all.
+    """Write the new text to the file, atomically.
 
     Its mode, owner and byte order mark stay.
 

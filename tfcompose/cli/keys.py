@@ -52,7 +52,7 @@ class KeyDecoder:
         return _keys(text[: len(text) - len(self._rest)])
 
     def end(self) -> list[str]:
-        """Return the keys in what came, as nothing followed."""
+        """Return the keys in the input, if no more input follows."""
         text, self._rest = self._rest, ""
         return _keys(text)
 

@@ -122,7 +122,7 @@ class _Variants:
     disk: Disk
 
     def in_combinations(self, profiles: Sequence[str]) -> tuple[list[Finding], list[Compiled]]:
-        """Return the findings for each combination of argument values, and what was compiled."""
+        """Return findings and compiled robots for each combination of argument values."""
         if not self.source.has(("args",)) and not self.overlays:
             alone = self._compile(self.given, profiles)
             return list(alone.found), [alone]
@@ -155,7 +155,7 @@ class _Variants:
     def with_each_profile(
         self, findings: Sequence[Finding], judged: Sequence[Compiled]
     ) -> list[Finding]:
-        """Return what each profile alone adds to the findings, and comments that allow nothing."""
+        """Return the findings that each profile adds, and unused allow comments."""
         from tfcompose.compiler.check import unused_allows
         from tfcompose.spec.language import profiles_in
 
@@ -240,5 +240,5 @@ def _identity(finding: Finding) -> _Identity:
 
 
 def _judgement(finding: Finding) -> tuple[str, str] | None:
-    """Return what a rule about the robot found, wherever it shows it; None for text and keys."""
+    """Return the findings of rules about the robot; None for findings about text and keys."""
     return (finding.code, finding.message) if finding.code >= "TF2" else None

@@ -50,7 +50,7 @@ def refuse_live_bag(arguments: Namespace) -> None:
 def observed_for(
     name: str, arguments: Namespace
 ) -> tuple[Plan | None, dict[Topics, TreeObserver]]:
-    """Return the plan of FILE, if one is given, and what was observed on topics (moving, fixed).
+    """Return the plan of FILE, if given, and the observation of the topics (moving, fixed).
 
     On its own, or --namespace's. ``name`` is that of the node that observes.
 
@@ -67,7 +67,7 @@ def observed_for(
 
 
 def from_bag(read: Callable[[], T]) -> T:
-    """Return what is read from a bag.
+    """Return the observation of a bag.
 
     Raises:
         SystemExit: after saying why it cannot be.
@@ -92,7 +92,7 @@ def observed(  # noqa: PLR0913 (all but two are named)
     may_be_silent: bool = False,
     joint_topics: Iterable[str] = (),
 ) -> dict[Topics, TreeObserver]:
-    """Return what was observed on pairs of topics (moving, fixed), as ``observe`` does."""
+    """Return the observations of pairs of topics (moving, fixed), as ``observe`` does."""
     settle_s = 0.0 if bag else SETTLE_S
     observers = {pair: TreeObserver(settle_s=settle_s) for pair in pairs}
     observe(
@@ -205,12 +205,12 @@ def _reject_silent_bag(bag: str, topics: Sequence[Topics]) -> None:
 
 
 def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:
-    """Say that there was no TF at all."""
+    """Print that there was no TF."""
     message = f"no TF message came on {names_of(topics)} for {seconds:.1f} s"
     notes = [Note(f"looked with {settings_text(os.environ)}")]
     reject([finding("TF811", message, None, notes=notes, help=elsewhere_help(elsewhere))])
 
 
 def names_of(topics: Iterable[Topics]) -> str:
-    """Return the topics as people read them."""
+    """Return the topics for display."""
     return " and ".join(topic for pair in topics for topic in pair)

@@ -195,7 +195,7 @@ class _LiveView:
         return self._code
 
     def print_rest(self, plan: Plan, output: NonBlockingOutput) -> None:
-        """Print on the terminal's own screen what went wrong, and how it ended."""
+        """Print the findings and the end of the run on the terminal's main screen."""
         if self._fault:
             warn(f"the live view failed: {self._fault}")
         console = Console(

@@ -74,7 +74,7 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
 
 
 def add_ros_args(parser: ArgumentParser) -> None:
-    """Add --ros-args, which takes the rest of the command line, or what is before ``--``."""
+    """Add --ros-args, with the rest of the command line or the part before ``--``."""
     parser.add_argument(
         "--ros-args",
         nargs=1,
@@ -190,7 +190,7 @@ def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> 
 
 
 def settle_duration(arguments: Namespace, default_s: float, *, is_live: bool) -> None:
-    """Give --for its default; refuse it where the running tree is not observed, as in a recording.
+    """Set the default of --for; refuse it without a running tree, as with a recording.
 
     Raises:
         SystemExit: after saying so.

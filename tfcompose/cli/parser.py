@@ -82,7 +82,7 @@ COMMANDS: dict[str, CommandModule] = {
 
 
 def all_groups() -> dict[str, dict[str, CommandModule]]:
-    """Return the commands of the core and of all installed tools, by what they are for."""
+    """Return the commands of the core and of all installed tools, by group."""
     groups = {title: dict(commands) for title, commands in GROUPS.items()}
     helps = groups.pop("Help")
     for tool_command in tool_commands.all_commands():
@@ -216,7 +216,7 @@ def parser_of(name: str, columns: int = 0) -> Parser:
 
 
 def help_text() -> str:
-    """Return what ``tfcompose --help`` prints."""
+    """Return the output of ``tfcompose --help``."""
     from textwrap import fill
 
     from tfcompose.cli.documentation import topics
@@ -282,14 +282,14 @@ def _open_closed_streams() -> None:
 
 
 def _escape_what_cannot_be_encoded(stream: TextIO) -> None:
-    """Print what a stream cannot encode as an escape instead of raising."""
+    """Print characters that a stream cannot encode as escapes instead of raising."""
     reconfigure = getattr(stream, "reconfigure", None)
     if reconfigure:
         reconfigure(errors="backslashreplace")
 
 
 def _discard_output() -> None:
-    """Let what is still held back for a reader that is gone go nowhere, without a traceback."""
+    """Discard buffered output for a closed reader, without a traceback."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

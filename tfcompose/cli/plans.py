@@ -105,7 +105,7 @@ def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span
 
 
 def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
-    """Return this machine's share of the plan, with what the command line says about the guard.
+    """Return the plan for this host, with the guard options of the command line.
 
     Raises:
         SystemExit: after saying that there is no such share.
@@ -138,7 +138,7 @@ def host_share(plan: Plan, host: str | None, here: str) -> Plan:
 def copy_plan(
     plan: Plan, file: Path, place: RuntimeDir, *, alone: bool, build_dir: Path | None = None
 ) -> Path:
-    """Copy the plan, and what stands beside it, to where the run is; return the copy.
+    """Copy the plan and its files to the run's folder; return the copy.
 
     A build then does not reach into a run. Meshes stay where they are: descriptions address them
     from the copy too. ``alone`` removes the copies of earlier runs; ``build_dir`` is where paths

@@ -144,7 +144,7 @@ def _plain(value: Any, preset: PresetSpec) -> Any:
 
 
 def _describe_keys(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return what is said under the keys, without what is empty."""
+    """Return the texts under the keys, without empty ones."""
     fields = {key: _plain(getattr(model, key), preset) for key in keys}
     return {key: value for key, value in fields.items() if value not in (None, "", {}, [], False)}
 
@@ -202,7 +202,7 @@ def _shape(shape: ShapeSpec) -> dict[str, Any]:
 
 
 def _optics(optics: PresetOptics, preset: PresetSpec) -> dict[str, Any]:
-    """Return what is known of the stream, in SI; its frame is there always."""
+    """Return the known properties of the stream, in SI, always with its frame."""
     keys = tuple(key for key in PresetOptics.model_fields if key != "source")
     sources = [
         {"of": list(source.of), "where": source.where, "quality": source.quality}
@@ -388,7 +388,7 @@ def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
-    """Return where the values of the optics are from.
+    """Return the sources of the optics' values.
 
     Each document once, with what it is and what it gives.
     """

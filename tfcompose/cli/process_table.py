@@ -26,7 +26,7 @@ def state_of(status: RobotStatus) -> str:
 
 
 def row(process: ProcessStatus, used: Usage) -> tuple[str, ...]:
-    """Return the cells of a process; ``used`` is what its group uses, where that is known."""
+    """Return the cells of a process; ``used`` is the usage of its process group, if known."""
     cpu, memory = used.get(process.pid or 0, (None, None))
     return (
         process.name,
@@ -41,7 +41,7 @@ def row(process: ProcessStatus, used: Usage) -> tuple[str, ...]:
 
 
 def _state(process: ProcessStatus) -> str:
-    """Return the state in words, with why it is in it where that is not plain."""
+    """Return the state in words, with its reason if that is not obvious."""
     state = process.state
     if process.state == "expected":
         return f"{state} of {process.host}" if process.host else state

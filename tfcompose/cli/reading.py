@@ -109,7 +109,7 @@ def _is_of_a_robot(text: str) -> bool:
 
 
 def forget_lines() -> None:
-    """Let ``line_of`` read files anew."""
+    """Clear the cache of ``line_of``."""
     _lines.cache_clear()
 
 

@@ -49,7 +49,7 @@ def robots_in(name: str) -> list[str]:
 
 
 class _Progress:
-    """Says what a long search does, once."""
+    """Prints once what a long search is doing."""
 
     def __init__(self, name: str) -> None:
         self._name = name

@@ -1,4 +1,4 @@
-"""``--ros-args`` of a command: what the nodes of the robot are given together."""
+"""``--ros-args`` of a command: ROS arguments for all nodes of the robot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def ros_arguments(argv: Sequence[str]) -> RosArguments:
-    """Return what follows ``--ros-args``.
+    """Return the arguments after ``--ros-args``.
 
     Raises:
         SystemExit: after saying that one is not for a whole robot.

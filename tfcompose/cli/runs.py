@@ -1,4 +1,4 @@
-"""Running robots: which one is meant, what its launcher is asked, and what it reports."""
+"""Running robots: selection, requests to the launcher, and its reports."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ASK_EVERY_S = 0.1
 
 
 def running() -> list[tuple[RuntimeDir, Holder]]:
-    """Return the robots that run, and who runs each.
+    """Return the running robots with their launchers.
 
     Raises:
         RuntimeDirError: if there is no folder that only this user can open.
@@ -153,7 +153,7 @@ def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
 def notices(
     place: RuntimeDir, timeout_s: float | None = None, output: TextIO | None = None
 ) -> Iterator[tuple[Notice, float]]:
-    """Yield what the launcher has reported and reports, with when, until it ends.
+    """Yield past and new notices of the launcher with their times, until it ends.
 
     ``output`` is where the caller prints them: once nobody reads it any more, the notices end,
     even if none comes.
@@ -238,7 +238,7 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
 
 
 def _why_not_ready(process: ProcessStatus) -> str:
-    """Return what it waits for before its start.
+    """Return the conditions that its start waits for.
 
     Else its state, what it is without, and what is seen there.
     """
@@ -281,7 +281,7 @@ def hidden_run(place: RuntimeDir) -> str | None:
 
 
 def warnings_before_start(place: RuntimeDir, plan: Plan, run_id: str) -> list[str]:
-    """Return what is in the way of a robot that is about to start, a sentence each."""
+    """Return obstacles to the start of a robot, a sentence each."""
     return [*other_domains(place), *_left_behind(place, run_id), *_neighbours(place, plan)]
 
 

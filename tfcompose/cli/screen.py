@@ -39,11 +39,11 @@ class Rows:
         self._drawn: list[str] = []
 
     def forget(self) -> None:
-        """Take the cursor's row for the first one, and what is below it for empty."""
+        """Begin at the cursor's row, with empty rows below."""
         self._drawn = []
 
     def change(self, rows: Sequence[str]) -> str:
-        """Return what a terminal needs to show these rows instead of those drawn before."""
+        """Return the output that replaces the drawn rows by these."""
         before, self._drawn = self._drawn, list(rows)
         if before == self._drawn:
             return ""
@@ -66,7 +66,7 @@ class LiveLines:
         self._columns = 0
 
     def draw(self, lines: Sequence[str]) -> None:
-        """Draw the lines where the last ones were.
+        """Redraw the lines in place.
 
         Those that the terminal has no room for are counted only.
         """
@@ -133,7 +133,7 @@ class Screen:
         self._size = (0, 0)
 
     def leave(self) -> None:
-        """Put the terminal back to what it was; one that has gone needs nothing."""
+        """Restore the terminal, unless it has gone."""
         if not self._is_shown:
             return
         self._is_shown = False

@@ -154,7 +154,7 @@ def start(
 
 
 def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
-    """Print what is odd here, and end the command where anything is in the way of the start.
+    """Print warnings, and exit if something prevents the start.
 
     Raises:
         SystemExit: after saying all of it.
@@ -283,7 +283,7 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
 def _detach(
     plan: Plan, place: RuntimeDir, lock: Lock, session: RunSession, arguments: Namespace
 ) -> int:
-    """Start the launcher as a process of its own; return 0 when all is started, or ready.
+    """Start the launcher as a separate process; return 0 when all processes are started, or ready.
 
     1 when it is not.
     """
@@ -305,7 +305,7 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
     duration_s: float | None,
     mask: Iterable[int] | None = None,
 ) -> int:
-    """Start the launcher as a process of its own, and return its number.
+    """Start the launcher as a separate process, and return its process id.
 
     With a ``mask`` of signals, which holds there, it ends with this process.
     """

@@ -123,7 +123,7 @@ def code_page(code: str) -> str:
 
 
 def code_addresses(stream: TextIO) -> CodeAddress:
-    """Return what gives the address of a code's page, for links in findings on a terminal.
+    """Return the function from a code to the address of its page, for links on a terminal.
 
     The pages are at ``$TFCOMPOSE_DOCS``, a URL or a folder, or at the project's own address. There
     are no links into a file or a pipe, with NO_COLOR, or to a page that a folder does not have.
@@ -167,7 +167,7 @@ def size_of(fd: int) -> tuple[int, int]:
 
 
 def printable(text: str) -> str:
-    """Return the text without what would move a terminal's cursor."""
+    """Return the text without sequences that would move the cursor."""
     return mask_invisible(text, "?")
 
 
@@ -195,7 +195,7 @@ def _marked(text: str) -> str:
 
 
 def has_reader(stream: TextIO) -> bool:
-    """Return whether what is written there can still be read.
+    """Return whether the stream still has a reader.
 
     ``tfcompose logs -f | head -1`` ends that.
     """
@@ -203,7 +203,7 @@ def has_reader(stream: TextIO) -> bool:
 
 
 def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
-    """Wait until there is something to receive, or nobody reads the stream any more.
+    """Wait until there is input, or the stream has lost its reader.
 
     Return whether it is read.
 
@@ -218,7 +218,7 @@ def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
 def _first_ready(
     stream: TextIO, connection: socket.socket | None, timeout_ms: float | None
 ) -> object:
-    """Return the stream if nobody reads it; else the connection if it has something; else None."""
+    """Return the stream if it lost its reader, else the connection if it has input."""
     poll = select.poll()
     with suppress(OSError):  # it has no descriptor: nobody can leave
         poll.register(stream.fileno(), 0)

@@ -79,12 +79,12 @@ def _load_module(tool: Tool, module: str) -> Any:
 
         message = f"the tool {tool.name} cannot be loaded: {type(error).__name__}: {error}"
         reject(
-            [finding("TF921", message, None, help=f"mend or uninstall it: {module}")], UNREADABLE
+            [finding("TF921", message, None, help=f"repair or uninstall it: {module}")], UNREADABLE
         )
 
 
 def summary_of(command: CommandModule) -> str:
-    """Return what a command does, in one line without a full stop."""
+    """Return the purpose of a command in one line, without a full stop."""
     if isinstance(command, ToolCommand):
         return command.command.summary
     return (command.__doc__ or "").partition("\n")[0].removesuffix(".")
@@ -129,7 +129,7 @@ def instead_of(name: str) -> str:
 
 
 def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOption]:
-    """Add the options that tools bring for a command, if it lacks one that is given.
+    """Add the options of tools to a command, if an unknown option is used.
 
     Return what was added.
     """
@@ -144,7 +144,7 @@ def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOpti
 
 
 def add_all_options(name: str, parser: Parser) -> list[ToolOption]:
-    """Add the options that all installed tools bring for a command."""
+    """Add the options of all installed tools to a command."""
     return _add(name, parser, installed(), ())
 
 
@@ -177,7 +177,7 @@ def _refuse_absent(parser: Parser, argv: Sequence[str]) -> None:
 
 
 def report_problems() -> None:
-    """Print what is wrong with tools of other packages, if anything is."""
+    """Print problems of tools in other packages."""
     problems = installed().problems
     if problems:
         from tfcompose.cli.terminal import print_findings

@@ -58,7 +58,7 @@ _PLAIN = re.compile(r"true|false|yes|no|on|off|[-+]?[0-9]{0,9}(?:\.[0-9]{0,9})?"
 
 @contextmanager
 def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
-    """Take all variables but those that programs need from this process, so that none is read.
+    """Remove all environment variables from this process except those that programs need.
 
     Yield all that there were.
     """
@@ -73,7 +73,7 @@ def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
 
 
 def declared_variables(source: Source, environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the variables that a file's args read, where their value is no secret.
+    """Return the variables that a file's args read, if their values cannot be secrets.
 
     It is one of the declared choices, a switch or a number: a stranger may declare that an
     argument reads any variable, and findings name values.
@@ -123,15 +123,15 @@ class UntrustedFiles:
         return self._read(path)
 
     def is_file(self, path: str) -> bool:
-        """Return whether a file that may be read is there."""
+        """Return whether a readable file exists there."""
         return self.reach.allows(path) and is_file(path)
 
     def is_folder(self, path: str) -> bool:
-        """Return whether a folder that may be read is there."""
+        """Return whether a readable folder exists there."""
         return self.reach.allows(path) and is_folder(path)
 
     def disk(self) -> Disk:
-        """Return what a compiler may ask about files; meshes are not measured."""
+        """Return the compiler's access to files, without measuring meshes."""
         return replace(
             self._disk,
             read=self.read,

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write the file, whole or not at all.
+    """Write the file atomically.
 
     Who reads it meanwhile sees the one before, whose mode and owner stay.
 
@@ -133,7 +133,7 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
 
 
 def _back_up(target: Path, old: Path) -> None:
-    """Keep the file under another name: what takes its place does not change it.
+    """Keep the old file under another name while a new one replaces it.
 
     A copy where that cannot be.
     """
@@ -253,7 +253,7 @@ def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:
 
 
 def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Finding]:
-    """Return where descriptions among the robot's files differ when read back."""
+    """Return the differences of URDFs that were read back."""
     from tfcompose.compiler.urdf.read_back import differences
 
     texts = {file.path: file.text for file in files}

@@ -123,4 +123,4 @@ def _files_next_to(name: str) -> str:
         there = []
     if not there:
         return f"there is no {ending} file in {folder}"
-    return f"in {folder} there is {', '.join(there[:_MOST_NAMED])}"
+    return f"the folder {folder} contains {', '.join(there[:_MOST_NAMED])}"

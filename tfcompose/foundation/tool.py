@@ -231,11 +231,11 @@ def installed() -> Toolset:
         try:
             tool = load(reference)
             if not isinstance(tool, Tool):
-                raise TypeError(f"{reference} is no Tool")  # noqa: TRY301 (as if not loaded)
+                raise TypeError(f"{reference} is not a Tool")  # noqa: TRY301 (as if not loaded)
             names = list(tool.names())
         except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
             message = f"the tool {entry_name} cannot be loaded: {type(error).__name__}: {error}"
-            problems.append(Problem("TF921", message, f"mend or uninstall it: {reference}"))
+            problems.append(Problem("TF921", message, f"repair or uninstall it: {reference}"))
             continue
         clashes = [*_clashes(tool, owners), *_wrong_codes(tool)]
         problems += clashes

@@ -161,7 +161,7 @@ class EventWriter:
             self.emit(Alive())
 
     def flush(self) -> None:
-        """Write what was taken."""
+        """Write the taken notices."""
         if not self._lines or self._pipe is None:
             return
         data = memoryview(b"".join(self._lines))
@@ -185,7 +185,7 @@ class SilentEdges:
         self._reported: list[str] = []
 
     def report(self) -> None:
-        """Report what is different."""
+        """Report changes."""
         changes = sum(judge.live.changes for judge in self._judges)
         if changes == self._changes:
             return
@@ -204,7 +204,7 @@ class SilentEdges:
 
 
 class FindingsReport:
-    """Reports all that is wrong now whenever that has changed, for who asks the launcher."""
+    """Sends the current findings to the launcher whenever they change."""
 
     def __init__(
         self, sources: Sequence[Callable[[], list[Finding]]], emit: Callable[[GuardEvent], None]
@@ -214,7 +214,7 @@ class FindingsReport:
         self._reported: tuple[Finding, ...] = ()
 
     def report(self) -> None:
-        """Report what is different, if it is time."""
+        """Report changes if a report is due."""
         if time.monotonic() < self._due:
             return
         self._due = time.monotonic() + FINDINGS_EVERY_S
@@ -228,7 +228,7 @@ class FindingsReport:
 
 
 def recall_memory(env: Mapping[str, str]) -> dict[str, Any]:
-    """Return what the guard before this one left, by topics; nothing where there was none."""
+    """Return the state of the previous guard by topics; empty if there was none."""
     if MEMORY_FD not in env:
         return {}
     with os.fdopen(int(env[MEMORY_FD]), "rb") as file:
@@ -241,7 +241,7 @@ def recall_memory(env: Mapping[str, str]) -> dict[str, Any]:
 
 
 class Memory:
-    """Hands on what a judge knows and a relay latches, each part whenever it changes."""
+    """Sends the state of judge and relay to the launcher, each part when it changes."""
 
     def __init__(
         self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]
@@ -254,7 +254,7 @@ class Memory:
         self._left: dict[str, Any] = {}
 
     def hand_on(self) -> None:
-        """Hand on what has changed."""
+        """Send changed state."""
         mark = (self._judge.mark, self._relay and self._relay.changes)
         if mark == self._mark:
             return
@@ -281,7 +281,7 @@ class SwitchMemory:
         switches.recall(self._left)
 
     def hand_on(self) -> None:
-        """Hand on what has changed."""
+        """Send changed state."""
         answered = self._switches.answered
         if answered != self._left:
             self._left = answered

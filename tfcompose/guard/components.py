@@ -82,7 +82,7 @@ class Components:
         self.add(order, request)
 
     def add(self, order: ComponentOrder, request: LoadRequest) -> None:
-        """Carry out an order about a component; where nothing can be loaded at all, answer so."""
+        """Carry out an order about a component, or answer that no component can be loaded."""
         try:
             self._container(request.container)
         except ImportError:
@@ -120,7 +120,7 @@ class Components:
                     self._check_loaded(name, container)
 
     def _check_loaded(self, name: str, container: Container) -> None:
-        """Take what a container has, which was asked for the last time, and ask again."""
+        """Read the answer with a container's components, and ask again."""
         loaded = [entry for entry in self._loaded.values() if entry[1].container == name]
         there, is_there = container.list.answer(), container.list.is_there
         for order, request in loaded if there or not is_there else ():
@@ -148,7 +148,7 @@ class Components:
         return self._containers[name]
 
     def _is_done(self, job: _Job, container: Container, now: float) -> bool:
-        """Do what is due for an order; return whether it is answered."""
+        """Continue an order; return whether it is answered."""
         if job.order.do == "load":
             return self._is_loaded(job, job.order, container, now)
         return self._is_unloaded(job, job.order, container, now)
@@ -187,7 +187,7 @@ class Components:
         return False
 
     def _begins(self, job: _Job, container: Container, now: float, step: str) -> bool:
-        """Look whether the component is there, or load it.
+        """Check for the component, or load it.
 
         Return False where that cannot be asked, and is answered.
         """
@@ -255,7 +255,7 @@ def _already(request: LoadRequest, there: Any) -> str:
 
 
 class ComponentDriver:
-    """The plan's components, where no launcher gives orders."""
+    """The plan's components, without a launcher that gives orders."""
 
     def __init__(self, node: Node, own: Own, *, private: bool) -> None:
         def fill(text: str) -> str:
@@ -270,7 +270,7 @@ class ComponentDriver:
         self._printed: dict[str, str] = {}
 
     def check(self) -> None:
-        """Have each container load what it does not have, and print what has changed."""
+        """Order missing components from each container, and print changes."""
         now = time.monotonic()
         if now >= self._due:
             self._due = now + CHECK_EVERY_S

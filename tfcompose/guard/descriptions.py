@@ -38,7 +38,7 @@ class Descriptions:
         self._writers: dict[str, tuple[ParameterWriter, float]] = {}
 
     def take(self, order: DescriptionOrder) -> None:
-        """Give a node its description; one that waits for another gets this one."""
+        """Give a node its description, instead of one that is still waiting."""
         self.forget(order.process)
         try:
             found = _LINE.search(Path(order.file).read_text(encoding="utf-8"))
@@ -58,7 +58,7 @@ class Descriptions:
             writer.close()
 
     def check(self) -> None:
-        """Send what can be sent, and report what was taken or refused."""
+        """Send waiting descriptions, and report which were accepted or refused."""
         for process, (writer, since) in list(self._writers.items()):
             why = writer.refusal()
             if why is None and time.monotonic() - since > ANSWER_S:

@@ -49,12 +49,12 @@ class DiagnosticsPublisher:
 
     @staticmethod
     def is_installed() -> bool:
-        """Return whether the package diagnostic_msgs is there."""
+        """Return whether the package diagnostic_msgs is installed."""
         return find_spec("diagnostic_msgs") is not None
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody listens."""
+        """Whether there is a subscriber."""
         return bool(self._publisher.get_subscription_count())
 
     def publish(self, statuses: Sequence[Status], stamp_ns: int) -> None:
@@ -86,7 +86,7 @@ def _level(edge: EdgeHealth) -> int:
 
 
 def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
-    """Return the status of what a strict guard held back.
+    """Return the status of the edges that a strict guard blocked.
 
     Transforms by their sender's node, parent and child.
     """

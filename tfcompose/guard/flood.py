@@ -1,4 +1,4 @@
-"""Reads what those send who flood the tree.
+"""Reads messages of publishers that flood the tree.
 
 Beside everything else, and a little at a time, so that nothing waits.
 """
@@ -25,7 +25,7 @@ _TOGETHER = 50
 
 
 class FloodReader:
-    """Takes the declared edges out of long messages, each message's as one of their own.
+    """Extracts the declared edges from long messages, as separate messages.
 
     ``children`` are the frames whose edges are declared. A message that comes while another is
     read is skipped, and ``skipped`` counts it; so much of each second goes into reading, whoever
@@ -42,7 +42,7 @@ class FloodReader:
 
     @property
     def is_reading(self) -> bool:
-        """Whether there is something to read, and time left for it in this second."""
+        """Whether there are messages, and time left in this second to read them."""
         return self._data is not None and self._spent_s <= BUSY_S
 
     def add(self, data: TFData) -> None:

@@ -29,7 +29,7 @@ DEEPEST_LOOP = 100
 
 @dataclass(slots=True)
 class Frame:
-    """A child frame: its parent, when it came last, and who sent it, the newest sender last."""
+    """A child frame: its parent, its last arrival, and its senders, the newest last."""
 
     parent: str
     last: float
@@ -70,12 +70,12 @@ class Frames:
         return current, current != gid and gid in senders
 
     def current_sender(self, child: str) -> bytes | None:
-        """Return who sent a planned frame last; None if nobody has."""
+        """Return the last sender of a planned frame; None if there is none."""
         senders = self._planned[child].senders if child in self._planned else ()
         return senders[-1] if senders else None
 
     def forget_senders(self, child: str) -> None:
-        """Take whoever sends the planned frame next as the first."""
+        """Treat the next sender of the planned frame as its first."""
         self._planned[child].senders = ()
 
     def loop(self, parent: str, child: str, now: float) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ class Frames:
         return frame.parent if frame and now - frame.last < KEPT_S else None
 
     def memory(self) -> dict[str, tuple[str, ...]]:
-        """Return what the next guard must know: the senders of planned frames, in hexadecimal."""
+        """Return the state for the next guard: senders of planned frames, in hexadecimal."""
         return {
             child: tuple(gid.hex() for gid in frame.senders)
             for child, frame in self._planned.items()

@@ -103,7 +103,7 @@ class Gates:
             states.append((is_there, observed))
         for topic in gate.writers:
             names = ", ".join(writer.node for writer in writers(self._node, topic))
-            states.append((False, f"{topic} is published by {names or 'nobody'}"))
+            states.append((False, f"{topic} is published by {names or 'no node'}"))
         return all(is_open for is_open, _ in states), "; ".join(observed for _, observed in states)
 
     def _topics(self, wanted: str) -> str:
@@ -124,7 +124,7 @@ class _DrivenNode:
 
 
 class LifecycleDriver:
-    """The plan's lifecycle nodes, where no launcher gives orders."""
+    """The plan's lifecycle nodes, without a launcher that gives orders."""
 
     def __init__(self, node: Node, plan: Plan) -> None:
         wanted = {
@@ -136,7 +136,7 @@ class LifecycleDriver:
         ]
 
     def check(self) -> None:
-        """Drive each node that is due one step further, and print what has changed."""
+        """Advance each due node one transition, and print changes."""
         now = time.monotonic()
         for watched in self._nodes:
             if now < watched.due:
@@ -177,7 +177,7 @@ AGAIN_EVERY_S = 2.0
 
 @dataclass(slots=True)
 class _NodeSwitches:
-    """One node: what the plan wrote, for which sensors, and how far the question is."""
+    """One node: the parameters in the plan, its sensors, and the state of the request."""
 
     node: str
     wanted: dict[str, Value]

@@ -1,4 +1,4 @@
-"""Watches joint states: each joint has one publisher, and is one that the robot has.
+"""Watches joint states: each joint must belong to the robot and have one publisher.
 
 A joint's edge has one publisher whoever sends the states, so TF alone does not show that two do.
 The topics are read from time to time and wake nobody.
@@ -42,11 +42,11 @@ class JointWatch:
         self._wrong: dict[tuple[str, str], Finding] = {}
 
     def wrong(self) -> list[Finding]:
-        """Return what was reported and is not over."""
+        """Return the open findings."""
         return list(self._wrong.values())
 
     def check(self) -> None:
-        """Take what has come and report what is new or over, if it is time."""
+        """Read messages, and report new and resolved findings when due."""
         if not self._topics or time.monotonic() < self._due:
             return
         self._due = time.monotonic() + READ_EVERY_S

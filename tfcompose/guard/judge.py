@@ -36,7 +36,7 @@ STARTING_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class JudgeMemory:
-    """What the guard that follows this one must know of one pair of topics.
+    """State for the next guard, of one pair of topics.
 
     The launcher keeps it, part by part. Ids of publishers are in hexadecimal.
     """
@@ -153,7 +153,7 @@ class Judge:
         return f"another {nodes[0]}" + (f" of {process}" if process else "")
 
     def graph(self, publishers: Sequence[Publisher], now: float) -> list[GuardEvent]:
-        """Take who publishes on /tf and /tf_static now, and return what that means."""
+        """Take the current publishers on /tf and /tf_static; return the events that follow."""
         self._senders.update(publishers)
         events = [*self._recheck(now), *self._publishers.wrong_settings(publishers)]
         for report in self._publishers.leaving_the_fence(publishers, self._senders, now):
@@ -171,7 +171,7 @@ class Judge:
         return events
 
     def clock(self, sim_ns: int | None, now: float) -> None:
-        """Take the newest time on /clock; where that went back, stamps go back with it."""
+        """Take the newest time on /clock. After a jump back, stamps may go back too."""
         before = self.clocks.sim_ns
         self.clocks.take(sim_ns, now)
         if before is not None and sim_ns is not None and sim_ns < before:
@@ -190,7 +190,7 @@ class Judge:
         self.ledger.count_flood(gid, transforms, now)
 
     def tick(self, now: float) -> list[GuardEvent]:
-        """Return what the passing of time means."""
+        """Return the events that are due at this time."""
         events = [
             *self._recheck(now),
             *self.ledger.report(now),
@@ -209,7 +209,7 @@ class Judge:
         return events
 
     def health(self, now: float) -> list[EdgeHealth]:
-        """Return what is known of each planned edge, in the plan's order."""
+        """Return the state of each planned edge, in the plan's order."""
         found = {}
         for track in self.live.tracks:
             age_s, rate = self.live.seconds_since(track, now) if track.live else (None, None)
@@ -229,14 +229,14 @@ class Judge:
         return [found[edge.child] for edge in self.plan.edges]
 
     def wrong(self) -> list[Finding]:
-        """Return what was reported and is not over, worst first.
+        """Return the open findings, worst first.
 
         Silence and low rates are not among it: they are part of ``health``, and ``live`` has them.
         """
         return self.ledger.wrong()
 
     def absent(self, owner: str) -> None:
-        """Take the owner as stopped on purpose; who publishes its edges next is no second one."""
+        """Treat the owner as stopped on purpose: the next publisher of its edges replaces it."""
         edges = self.plan.edges_of(owner)
         if edges:
             self.live.absent(owner)
@@ -246,12 +246,12 @@ class Judge:
 
     @property
     def mark(self) -> tuple[int, ...]:
-        """What changes when there is more to remember."""
+        """A value that changes with the state for the next guard."""
         changes = (self.ledger.epoch, self.live.changes, self._publishers.changes)
         return (*changes, *self._senders.mark)
 
     def memory(self) -> JudgeMemory:
-        """Return what the guard that follows this one must know."""
+        """Return the state for the next guard."""
         return JudgeMemory(
             self._start,
             self.ledger.frames.memory(),
@@ -277,7 +277,7 @@ class Judge:
     # What is seen.
 
     def _recheck(self, now: float) -> list[GuardEvent]:
-        """Judge what waited for a name."""
+        """Judge messages that waited for a node name."""
         return [
             event
             for children in self.ledger.recheck(now)

@@ -1,4 +1,4 @@
-"""Ledger of edges: which publisher sends which, what is wrong with it, and what was reported.
+"""Ledger of edges: their publishers, faults and reports.
 
 A message is judged once; the verdict holds for the next one of the same publisher with the same
 edges until the ledger's ``epoch`` changes: with the senders of a frame, the shape of the tree, the
@@ -155,7 +155,7 @@ class Ledger:
 
     @property
     def is_settled(self) -> bool:
-        """Whether nothing waits for its sender's name, or to be reported."""
+        """Whether no message waits for its sender's name, and no fault for its report."""
         return not self._waiting and all(entry.reported for entry in self.entries.values())
 
     def take(self, message: Message, now: float) -> JudgedMessage:
@@ -212,7 +212,7 @@ class Ledger:
         judged.until = now + UNDECLARED_S if unplanned else float("inf")
 
     def recheck(self, now: float) -> list[tuple[str, ...]]:
-        """Judge what waited for a name; return the planned edges that have come, by sender."""
+        """Judge messages that waited for a name; return the planned edges in them, by sender."""
         arrived: dict[bytes | None, list[str]] = {}
         for sent, since in list(self._waiting.items()):
             nodes = self._senders.nodes(sent.gid, static=sent.static)
@@ -245,7 +245,7 @@ class Ledger:
         self.epoch += 1
 
     def forget_owners(self, edges: Iterable[PlanEdge]) -> None:
-        """Take whoever sends these edges next as the first: their owner was stopped on purpose."""
+        """Treat the next sender of these edges as the first: their owner was stopped."""
         for edge in edges:
             self.frames.forget_senders(edge.child)
         self.epoch += 1
@@ -256,7 +256,7 @@ class Ledger:
             judged.stamps = StampHistory()
 
     def _key(self, fault: Fault, gid: bytes | None) -> Key:
-        """Return what the fault is known by: its publisher, unless several may have done it."""
+        """Return the key of the fault: its publisher, if there is only one candidate."""
         is_sure = gid is not None and self._senders.is_sure(gid) and not fault.alternates
         return (fault.code, fault.parent, fault.child, (is_sure and gid) or b"")
 
@@ -266,7 +266,7 @@ class Ledger:
         return known + sum(sent.gid == gid for sent in self._waiting)
 
     def _patience_s(self, sent: SentEdge, nodes: tuple[str, ...]) -> float:
-        """Return how long to wait for the sender's name; longer for one that may be the owner."""
+        """Return the time to wait for the sender's name; longer if it may be the owner."""
         edge = self.planned.get(sent.child)
         if nodes or edge is None or not edge.may_hang_on(sent.parent):
             return NAMELESS_S
@@ -284,7 +284,7 @@ class Ledger:
     # Rules.
 
     def _fault(self, sent: SentEdge, nodes: tuple[str, ...], now: float) -> Fault | None:
-        """Return what is wrong with an edge that one of these nodes sent, or None."""
+        """Return the fault of an edge that one of these nodes sent, or None."""
         gid, parent, child, static = sent
         edge = self.planned.get(child)
         if parent == child:
@@ -416,7 +416,7 @@ class Ledger:
         return [*map(RecoveredShown, texts), *self._report_remaining(now)]
 
     def wrong(self) -> list[Finding]:
-        """Return what was reported and is not over, for each edge and name, worst first."""
+        """Return the open faults by edge and name, worst first."""
         findings = []
         for edges in self._by_group().values():
             for entries in edges.values():
@@ -448,7 +448,7 @@ class Ledger:
         return replace(fault, edge=self.planned.get(fault.child)) if fault.edge else fault
 
     def _group(self, entry: OpenFault) -> Group:
-        """Return with what a fault is reported: its code and node, or the robot it belongs to."""
+        """Return the group of a fault in reports: its code and node, or the robot of the node."""
         if run := self._senders.run(entry.gid):
             return (OTHER_ROBOT, run.name, "")
         return (entry.fault.code, entry.fault.who, self._senders.process(entry.gid))
@@ -517,7 +517,7 @@ class Ledger:
         return FindingShown(replace(found, notes=(*found.notes, *notes)), offender)
 
     def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
-        """Report who sends edges of which some publishers have ended, or others have come."""
+        """Report edges again whose publishers have changed."""
         due = [group for group in self._left if self._is_due((group, False), now)]
         by_group = self._by_group() if due else {}
         for group in due:
@@ -537,7 +537,7 @@ class Ledger:
         return faults.over_texts(self._ended.pop(group), robot)
 
     def _compare(self, entry: OpenFault, edges: Mapping[Ends, Sequence[OpenFault]]) -> None:
-        """Note whether an edge is over, or who was named does not send it any more, or others do.
+        """Note that a fault is over, or that its publishers have changed.
 
         The entry has ended, or is of publishers that alternate; ``edges`` are its group's.
         """
@@ -570,7 +570,7 @@ class Ledger:
     # Publishers.
 
     def _publishers(self, entries: Sequence[OpenFault]) -> list[bytes | None]:
-        """Return who is there of the publishers of these entries: an id of each process.
+        """Return the present publishers of these entries: one id for each process.
 
         A process may have a publisher on each topic. Where it is not known by its pid, only
         publishers of one edge on one topic are surely several.
@@ -601,7 +601,7 @@ class Ledger:
         return [*self._senders.named(fault.nodes, static=fault.static)] or [entry.gid]
 
     def _process_of(self, gid: bytes | None) -> str | bytes:
-        """Return what distinguishes the publisher's process from others."""
+        """Return the identity of the publisher's process."""
         known = self._senders.where(gid) or self._senders.process(gid)
         return known or (gid or b"")[:PARTICIPANT]
 
@@ -625,7 +625,7 @@ class Ledger:
         return self._plan.guard.mode == "strict" and not fault.is_of_stamps
 
     def _may_learn_fate(self, entry: OpenFault, now: float) -> bool:
-        """Return whether it may soon be known if listeners get what was sent."""
+        """Return whether it will soon be known if listeners receive the message."""
         is_open = self._says_fate(entry.fault) and self._senders.is_held_back(entry.gid) is None
         return is_open and now - entry.since < FATE_S
 

@@ -68,7 +68,7 @@ class EdgeHealth:
 
     @property
     def text(self) -> str:
-        """What is known, in words."""
+        """The state in words."""
         if self.age_s is None:
             return "not seen yet"
         numbers = [f"age {self.age_s:.3f} s"] if self.edge.kind != "static" else ["latched"]
@@ -95,11 +95,11 @@ class WatchedTime:
         return self._seconds + min(max(now - self._ticked, 0.0), MAX_TICK_S)
 
     def begins_late(self, until: float) -> None:
-        """Take what is missing until then as not found yet."""
+        """Treat owners that are missing until then as not discovered yet."""
         self._catching_up_until = max(self._catching_up_until, until)
 
     def is_behind(self, now: float) -> bool:
-        """Return whether what comes now may have waited.
+        """Return whether messages that arrive now may have waited.
 
         The guard was kept from running, or lost messages, or still catches up.
         """
@@ -116,7 +116,7 @@ class WatchedTime:
 
 @dataclass(slots=True)
 class Track:
-    """What is known of planned edges that come together: of one owner, kind and rate.
+    """State of planned edges that arrive together: of one owner, kind and rate.
 
     ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age
     of the last stamp when it came, ``silent_after`` how long the edges may be quiet, in seconds,
@@ -182,7 +182,7 @@ class SilentMemory:
 
 @dataclass(frozen=True, slots=True)
 class LivenessMemory:
-    """What the next guard must know.
+    """State for the next guard.
 
     The edges, by their children, that are live, slow and silent, and gone owners.
     """
@@ -195,7 +195,7 @@ class LivenessMemory:
 
 @dataclass(slots=True, eq=False)
 class WrongEdges:
-    """What was reported of edges, as their places in the robot file are now."""
+    """Reports about edges, with their current locations in the robot file."""
 
     edges: list[PlanEdge]
     finding_of: Callable[[Sequence[PlanEdge]], Finding]
@@ -261,11 +261,11 @@ class Liveness:
         self._note_over(_children(tracks))
 
     def present(self, owner: str) -> None:
-        """Note that the owner was started: its edges must be observed anew."""
+        """Note that the owner was started: its edges must be received again."""
         self._absent.discard(owner)
 
     def memory(self) -> LivenessMemory:
-        """Return what the next guard must know."""
+        """Return the state for the next guard."""
         silent = tuple(
             SilentMemory(track.silent_since, _children([track]))
             for track in self.tracks
@@ -300,7 +300,7 @@ class Liveness:
     def arrived(
         self, children: tuple[str, ...], now: float, delay_s: float | None = None
     ) -> list[GuardEvent]:
-        """Note that owners sent these edges, in one message, and return what that means."""
+        """Take edges that owners sent in one message; return the events that follow."""
         watched, late, events = self._watched.at(now), self._watched.is_behind(now), []
         for track in self._of_message.get(children) or self._part_tracks(children):
             if track.edge.owner in self._absent:
@@ -367,11 +367,11 @@ class Liveness:
         return track.edge.kind == "static" and track.edge.owner in self._gone
 
     def is_behind(self, now: float) -> bool:
-        """Return whether what comes now may have waited for the guard."""
+        """Return whether messages that arrive now may have waited for the guard."""
         return self._watched.is_behind(now)
 
     def lost(self, now: float) -> None:
-        """Note that the guard itself lost messages: nobody is silent until they have come."""
+        """Note lost messages: until they are sent again, no owner counts as silent."""
         self._watched.begins_late(now + CATCH_UP_S)
 
     def tick(self, now: float) -> None:
@@ -412,7 +412,7 @@ class Liveness:
         return events
 
     def wrong(self) -> list[Finding]:
-        """Return what was reported of silent and slow edges and is not over."""
+        """Return the open findings about silent and slow edges."""
         return [reported.found for reported in dict.fromkeys(self._wrong.values())]
 
     def _note_wrong(self, reported: WrongEdges) -> None:
@@ -468,7 +468,7 @@ class Liveness:
 
 
 def _wrong(change: str, tracks: list[Track], now: float) -> WrongEdges | None:
-    """Return what to report of tracks that fell silent or slow; None where they came back."""
+    """Return the finding for tracks that fell silent or slow; None if they recovered."""
     edges = [edge for track in tracks for edge in track.edges]
     match change:
         case "silent":
@@ -499,7 +499,7 @@ def _children(tracks: list[Track]) -> tuple[str, ...]:
 
 
 def _change(track: Track, watched: float, speed: float) -> str | None:
-    """Bring the track up to date and return what changed."""
+    """Update the track and return changes."""
     after = track.silent_after or 0.0
     is_silent = watched - track.heard > after
     if is_silent and not track.silent:

@@ -1,4 +1,4 @@
-"""Watches what the guard itself loses: nobody is called silent for that.
+"""Watches messages that the guard itself loses, so that no owner is blamed for them.
 
 A burst of messages that is more than the guard's sockets hold loses its last ones on the way.
 """
@@ -35,7 +35,7 @@ class LossWatch:
         self._wrong: list[Finding] = []
 
     def wrong(self) -> list[Finding]:
-        """Return what was reported and is not over."""
+        """Return the open finding."""
         return self._wrong
 
     def check(self) -> None:
@@ -60,14 +60,15 @@ class LossWatch:
 
 
 def datagrams_lost(lost: int, limit: int | None) -> Finding:
-    """Return the finding for so many lost datagrams, where a socket can hold ``limit`` bytes."""
+    """Return the finding for lost datagrams; a socket holds at most ``limit`` bytes."""
     message = (
-        f"the guard itself lost {plural(lost, 'datagram')}: more came at once than it could take"
+        f"the guard itself lost {plural(lost, 'datagram')}: they arrived faster than it could"
+        " read them"
     )
-    note = Note("meanwhile no owner is called silent or slow")
+    note = Note("meanwhile no owner counts as silent or slow")
     if limit is None or limit < WANTED:
-        now = f" than the {limit:,} bytes of now" if limit is not None else ""
-        advice = f"let a socket hold more{now}: sudo sysctl -w {LIMIT}={WANTED}"
+        now = f" from {limit:,} bytes" if limit is not None else ""
+        advice = f"raise the socket buffer limit{now}: sudo sysctl -w {LIMIT}={WANTED}"
     else:
-        advice = "give the guard more of a processor, or let publishers send at different moments"
+        advice = "give the guard more CPU time, or let publishers send at different moments"
     return finding("TF862", message, None, notes=[note], help=advice)

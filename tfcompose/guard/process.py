@@ -132,7 +132,7 @@ class TopicWatch:
         )  # who sends more floods the tree, whatever it sends
 
     def watch_global_topics(self) -> None:
-        """Look for nodes of the plan on the global topics too, where they do not belong."""
+        """Find nodes of the plan that wrongly use the global topics."""
         self._leaks_to = self._graph.topics
 
     def begin(self, now: float, memory: dict[str, Any] | None) -> None:
@@ -161,11 +161,11 @@ class TopicWatch:
         return gather_s(self._number_taken, is_prompt=is_prompt)
 
     def close(self) -> None:
-        """End what must end before the node does."""
+        """End the readers and publishers that must end before the node."""
         self.data.close()
 
     def step(self) -> None:
-        """Take what has come, and from time to time the graph."""
+        """Take new messages and, from time to time, the graph."""
         now = time.monotonic()
         if self._clock:
             self.judge.clock(self._clock.now_ns(), now)
@@ -195,14 +195,14 @@ class TopicWatch:
                 self._pass_on(self.judge.leaks(self._graph.global_publishers(), self._leaks_to))
 
     def report(self, every_s: float = REPORT_EVERY_S) -> None:
-        """Say now and then what was held back."""
+        """Report blocked edges from time to time."""
         if self.relay and (not every_s or time.monotonic() >= self._report_due):
             self._report_due = time.monotonic() + every_s
             if held := self.relay.held.report():
                 say(f"held back: {held}")
 
     def _take(self, data: Iterable[TFData], now: float) -> bool:
-        """Take messages, and the graph before, where it must say who sent some.
+        """Take messages; read the graph first if it is needed to identify senders.
 
         Return whether that was so.
         """
@@ -231,7 +231,7 @@ class TopicWatch:
         yield from self._read(data, now)
 
     def _read(self, data: TFData, now: float) -> Iterator[tuple[JudgedMessage, Message]]:
-        """Read a message and pass it on; yield what is to be judged of it afterwards."""
+        """Read a message and forward it; yield the parts to judge afterwards."""
         received = data.received
         try:
             message = self._reader.read(received, static=data.static)
@@ -246,7 +246,7 @@ class TopicWatch:
         yield judged, message
 
     def _ask_graph(self, now: float) -> None:
-        """Take who publishes now; what waited for a name may pass."""
+        """Take the current publishers; messages that waited for a name may pass."""
         publishers = self._graph.publishers()
         present = {publisher.gid for publisher in publishers}
         forget_oldest(self._known, present)
@@ -265,7 +265,7 @@ class TopicWatch:
 
 
 def gather_s(taken: int, *, is_prompt: bool) -> float:
-    """Return how long messages gather after a step that took so many, in seconds.
+    """Return the time to gather messages after a step, in seconds.
 
     ``is_prompt`` says that what comes must not wait.
     """
@@ -273,7 +273,7 @@ def gather_s(taken: int, *, is_prompt: bool) -> float:
 
 
 def _run_marks(plan: Plan, profile: str) -> RunMarks:
-    """Return what the environments of this run's processes say.
+    """Return the identities in the environments of this run's processes.
 
     A component is where its container is.
     """
@@ -306,7 +306,7 @@ def _with_id(data: TFData) -> TFData:
 
 
 def count_held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int] | None:
-    """Return what was held back, or None where nothing is."""
+    """Return the blocked edges, or None if the guard blocks none."""
     relays = [watch.relay for watch in watches if watch.relay]
     return (
         {key: count for relay in relays for key, count in relay.held.counts.items()}
@@ -328,7 +328,7 @@ def plans_by_topics(plan: Plan, guard: PlanProcess) -> dict[Topics, Plan]:
 def together(
     emit: Callable[[GuardEvent], None], plans: Sequence[Plan]
 ) -> Callable[[GuardEvent], None]:
-    """Return what passes on the events of the judges of these plans.
+    """Return the sink for events of the judges of these plans.
 
     All clear and tree complete are reported once, when the last judge has reported them.
     """
@@ -426,7 +426,7 @@ def guard(own: Own, stop: Stop) -> None:
 
 
 def _reread(own: Own, judges: Sequence[Judge], switches: Switches | None, file: str) -> None:
-    """Have the judges follow the plan in the file, which starts no guard anew."""
+    """Switch the judges to the plan in the file, without a new guard."""
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
     except (OSError, ValueError, RejectedError) as error:
@@ -470,7 +470,7 @@ def _watches(
 
 
 def _of(private: dict[str, Topics] | None, plan: Plan, topics: Topics) -> dict[str, Topics] | None:
-    """Return the own topics of the processes that would send on these, where they are remapped."""
+    """Return the remapped topics of the processes that would send on these topics."""
     if private is None:
         return None
     return {name: pair for name, pair in private.items() if plan.process(name).topics == topics}

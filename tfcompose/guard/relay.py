@@ -1,4 +1,4 @@
-"""Relay of a strict guard: it passes on what each process owns, of all that it sends.
+"""Relay of a strict guard: it forwards the edges that each process owns.
 
 A message that is all its sender's goes on as it is, byte for byte. Of others what is not is left
 out. Each sender of fixed edges has a latched publisher here, so that late joiners get all of them
@@ -55,7 +55,7 @@ class _Latched:
 
 
 class Relay:
-    """Passes on what is sent behind the fence on one pair of topics (moving, fixed).
+    """Forwards messages of separated processes on one pair of topics (moving, fixed).
 
     ``own`` takes the ids of its publishers. With ``feedback`` the fence is one of remappings.
     ``changes`` counts what was latched.
@@ -84,7 +84,7 @@ class Relay:
     def pass_on(
         self, sent: TFData, message: Message, admitted: Collection[Edge] | None, who: str
     ) -> None:
-        """Pass on what is admitted of the message that ``who`` sent; None: all of it."""
+        """Forward the admitted part of a message from ``who``; None: all of it."""
         if self._feedback and not sent.fenced:
             self._feed(self._feedback, sent, message)  # everybody has it
             return
@@ -120,7 +120,7 @@ class Relay:
             self._send(encode(list(_admit(data, message, admitted))), sent.process)
 
     def memory(self) -> dict[str, Any]:
-        """Return what the guard that follows must latch.
+        """Return the latched edges for the next guard.
 
         Not every sender latches all that it has sent.
         """
@@ -130,7 +130,7 @@ class Relay:
         }
 
     def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
-        """Latch what the previous guard latched and may still relay, keeping senders a while.
+        """Latch the previous guard's edges that may still pass; keep their senders for a while.
 
         Until then the senders are found again.
         """
@@ -145,7 +145,7 @@ class Relay:
                 self._latch(gid, data, message, admits(message), entry[0])
 
     def update(self, writers: Collection[Publisher], now: float) -> None:
-        """Latch the edges of those that remain in the graph, and feed listeners."""
+        """Latch the edges of senders that remain in the graph, and send them to listeners."""
         if now >= self._finds_until:
             present = {writer.gid for writer in writers}
             for gid in [gid for gid in self._fixed if gid not in present]:
@@ -234,14 +234,14 @@ def _admit(
 
 
 class HeldBack:
-    """What was not relayed: ``counts`` are transforms by sender's node, parent and child."""
+    """Blocked transforms: ``counts`` by sender's node, parent and child."""
 
     def __init__(self) -> None:
         self.counts: dict[tuple[str, str, str], int] = {}
         self._reported: dict[tuple[str, str, str], int] = {}
 
     def count(self, message: Message, admitted: Collection[tuple[str, str]], who: str) -> None:
-        """Count what is not admitted of a message."""
+        """Count the blocked transforms of a message."""
         for parent, child in message.edges:
             key = (who, parent, child)
             if (parent, child) not in admitted and (
@@ -290,7 +290,7 @@ class Feedback:
         self._fixed: dict[bytes, tuple[str, dict[str, SentTransform]]] = {}
 
     def update(self) -> None:
-        """See who listens now, and latch for them what has changed."""
+        """Find the current listeners, and latch changes for them."""
         for process, listener in self._listeners.items():
             if listener.moving is None and self._is_heard(listener.topics[0]):
                 listener.moving = self._publisher(listener.topics[0], static=False)

@@ -68,7 +68,7 @@ class Pace(Generic[Key]):
 
 @dataclass(slots=True)
 class Flood:
-    """What a publisher of more undeclared edges than are judged has sent since then.
+    """Messages of a publisher since it exceeded the limit of undeclared edges.
 
     Messages, up to how long ones.
     """
@@ -88,7 +88,7 @@ class Flood:
 
     @property
     def hertz(self) -> float | None:
-        """How many messages came a second; None where that is not known."""
+        """Messages per second; None if unknown."""
         took_s = self.last - self.since
         return (self.messages - 1) / took_s if self.messages > 1 and took_s > 0 else None
 
@@ -206,7 +206,7 @@ class PublisherReports:
     def leaks(
         self, publishers: Sequence[Publisher], topics: tuple[str, str]
     ) -> list[FindingShown]:
-        """Return findings for the plan's nodes on the global topics instead of their own."""
+        """Return findings for nodes of the plan that use the global topics by mistake."""
         inside = f"/{self._plan.ros.namespace.strip('/')}/"
         return [
             found
@@ -236,7 +236,7 @@ class PublisherReports:
         return found
 
     def memory(self) -> tuple[tuple[str, str], ...]:
-        """Return what was reported: codes, with publishers' ids in hexadecimal."""
+        """Return the reports: codes with publisher ids in hexadecimal."""
         return tuple(sorted((code, gid.hex()) for code, gid in self._reported))
 
     def recall(self, memory: tuple[tuple[str, str], ...]) -> None:

@@ -41,7 +41,7 @@ def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str
 def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
     """Return the finding for a guard that ended while the others run, and is started again."""
     verb = "was ended by" if event.returncode < 0 else "ended with"
-    blind = "nothing of the plan passes to /tf" if strict else "nobody watches the tree"
+    blind = "no edge of the plan reaches /tf" if strict else "the tree is not watched"
     message = f"{name} {verb} {how_ended(event.returncode)}: {blind} until it is back"
     notes = [Note(f"{name}: {line}") for line in event.last_lines]
     advice = "it is restarted, and repeats no report"
@@ -91,10 +91,10 @@ def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
             f"{other} to be {what}" for other, what in owner.process.after.items()
         )
         why = f"was not started: it waits for {waits}" if waits else "was not started"
-        return finding("TF811", f"nobody published {names}: {name} {why}", None)
+        return finding("TF811", f"no node published {names}: {name} {why}", None)
     if owner.state in ("stopped", "exited", "fatal", "backoff"):
         why = f"{owner.state}: {owner.detail}" if owner.detail else owner.state
-        return finding("TF811", f"nobody publishes {names}: {name} is {why}", None)
+        return finding("TF811", f"no node publishes {names}: {name} is {why}", None)
     host = owner.process.host if owner.process.kind == "external" else None
     advice = (
         f"start its share on {host}: tfcompose up --host {host}; a profile with host: null starts"

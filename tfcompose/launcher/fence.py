@@ -89,12 +89,12 @@ def not_remapped(plan: Plan) -> list[Finding]:
     if not missed:
         return []
     message = (
-        f"guard: strict fences off by remapping, and the command of {_all(missed)} takes no ROS"
+        f"guard: strict uses remapping here, but the command of {_all(missed)} takes no ROS"
         " arguments"
     )
     advice = (
-        "start it as {package, executable}, or as a list of words, and not in a shell; or let the"
-        " guard watch"
+        "start it as {package, executable}, or as a list, and not in a shell; or use guard: {mode:"
+        " watch}"
     )
     return [finding("TF902", message, None, help=advice)]
 
@@ -146,26 +146,21 @@ def _profile(plan: Plan, command: ChildCommand, topics: list[str], *, reads: boo
     env = command.env
     moved = [topic for topic in topics if not topic.startswith("/")]
     if moved:
-        message = f"guard: strict needs full names of TF's topics, not {_all(moved)}, which has"
+        message = f"guard: strict needs absolute names of TF topics, not {_all(moved)}, as in"
         raise _CannotFenceError(message, "write the remapping with a leading slash")
     if not is_fastdds(env):
         message = (
-            f"guard: {{fence: partition}} needs rmw_fastrtps_cpp, and {env[RMW]} is what they are"
-            " started with"
+            f"guard: {{fence: partition}} needs rmw_fastrtps_cpp, but these start with {env[RMW]}"
         )
-        raise _CannotFenceError(
-            message, f"let it fence off by remapping: leave fence out; or unset {RMW}"
-        )
+        raise _CannotFenceError(message, f"use remapping: remove fence; or unset {RMW}")
     named = next((env[name] for name in PROFILE_VARIABLES if env.get(name)), None)
     file = command.folder / named if named else None
     partition = partition_of(plan)
     try:
         return with_partitions(file, "data_reader" if reads else "data_writer", topics, partition)
     except RosError as error:
-        message = f"guard: strict cannot add its fence to the profile file {file}: {error}"
-        raise _CannotFenceError(
-            message, "let it fence off by remapping: guard: {fence: remap}"
-        ) from None
+        message = f"guard: strict cannot add its partition to the profile file {file}: {error}"
+        raise _CannotFenceError(message, "use remapping: guard: {fence: remap}") from None
 
 
 def _refuse_own_profile(process: PlanProcess, command: ChildCommand) -> None:
@@ -178,16 +173,14 @@ def _refuse_own_profile(process: PlanProcess, command: ChildCommand) -> None:
         return
     variable, file = found[1], (found["file"] or "").strip("\"'")
     message = (
-        f"guard: strict cannot fence off a command that sets {variable}"
+        f"guard: strict cannot separate a command that sets {variable}"
         f" itself{f', to {file}' if file else ''}"
     )
     advice = (
-        f"name the file in the robot's file, and the fence is added to it: env: {{{variable}:"
-        f" {file or 'FILE'}}}"
+        f"name the file in the robot file, so that the partition is added to it: env:"
+        f" {{{variable}: {file or 'FILE'}}}"
     )
-    raise _CannotFenceError(
-        message, f"{advice}; or let it fence off by remapping: guard: {{fence: remap}}"
-    )
+    raise _CannotFenceError(message, f"{advice}; or use remapping: guard: {{fence: remap}}")
 
 
 def _all(names: list[str]) -> str:

@@ -203,13 +203,13 @@ def waits_for(state: State, tracked: Tracked) -> str:
         if edge.child not in state.live
     ]
     return {
-        "topic": f"nobody publishes {text}",
+        "topic": f"no node publishes {text}",
         "service": f"there is no service {text}",
         "lifecycle": "its nodes are not in their lifecycle states",
         "log": f"no line of its output holds {text}",
         "exit": "it still runs",
         "time": f"{ready.number if ready else 0:g} s have not passed",
-        "edges": f"nobody published {listed(missing, _NAMED_AT_MOST)}",
+        "edges": f"no node published {listed(missing, _NAMED_AT_MOST)}",
     }.get(gate_of(tracked.process), "")
 
 

@@ -1,6 +1,6 @@
 """State of the process machine, and one transition of it with its actions.
 
-Times are seconds of one monotonic clock. What is known are values only: a step replaces them.
+Times are seconds of one monotonic clock. All values are immutable: a step replaces them.
 """
 
 from __future__ import annotations
@@ -28,73 +28,75 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """How long the launcher waits, in seconds."""
+    """Waiting times of the launcher, in seconds."""
 
-    #: For the guard's report that no planned edge is published yet, besides its observation.
+    #: For the guard's report that no planned edge is published yet, in addition to the settle
+    #: time.
     clear_s: float = 20.0
+    #: Between SIGINT and SIGTERM.
     interrupt_s: float = 5.0
-    """between SIGINT and SIGTERM"""
+    #: Between SIGTERM and SIGKILL.
     terminate_s: float = 5.0
-    """between SIGTERM and SIGKILL"""
+    #: Until missing edges are reported, and between two such notices.
     waiting_s: float = 5.0
-    """until missing edges are named, and between two such notices"""
+    #: Before the first restart; doubled with each further one.
     backoff_s: float = 1.0
-    """before the first restart; doubled with each further one"""
+    #: The longest wait before a restart.
     backoff_limit_s: float = 30.0
-    """the longest wait before a restart"""
+    #: After a run of this length, earlier failures do not count.
     steady_s: float = 10.0
-    """a run as long as this makes earlier failures forgotten"""
+    #: For a process to become ready, if its readiness check has no timeout.
     ready_s: float = 30.0
-    """for a process to be ready, where it has a readiness check without a timeout"""
+    #: Without a sign of life of the guard, until it is overdue.
     guard_silent_s: float = 10.0
-    """without a sign of life of the guard's, until it is overdue"""
+    #: From then until the guard counts as hung.
     guard_overdue_s: float = 5.0
-    """further, until it is taken to hang"""
+    #: Two signals closer than this count as one: ``timeout`` and closing terminals send them
+    #: twice.
     same_signal_s: float = 0.2
-    """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
 
 
-#: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE
-#: ended.
+#: The exit code when the reader of the output has gone, as a shell reports SIGPIPE.
 UNREAD = 141
 
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """One process. ``since`` is when it came into its state, or when it was sent its last signal.
-
-    ``order`` counts the starts of all processes, 0 for one that was never started; ``failures``
-    the short runs in a row; ``restarts`` all starts but the first; ``level`` how often it was
-    ordered to stop, each time more firmly. ``leaving`` says what follows once it has stopped:
-    "stop" and it stays so, "again" and it is started, "drop" and it is forgotten. ``observed`` is
-    what its gate found last, ``late`` whether that was reported. ``detail`` says why it is in its
-    state. ``failed`` is what was reported when the run went on without it: the finding and the end
-    of its log. ``description`` is the parameter file with a description that its node has not
-    taken.
-    """
+    """One process of the plan."""
 
     process: PlanProcess
     state: StateName
     pid: int | None = None
+    #: When it entered its state, or when it was sent its last signal.
     since: float = 0.0
+    #: Its place among the starts of all processes; 0: never started.
     order: int = 0
+    #: Short runs in a row.
     failures: int = 0
+    #: Number of stop orders, each firmer than the one before.
     level: int = 0
     ready: bool = False
     wanted: bool = True
+    #: After its stop: "stop", it stays stopped; "again", it starts again; "drop", it is forgotten.
     leaving: Literal["", "stop", "again", "drop"] = ""
+    #: Starts after the first one.
     restarts: int = 0
     began: float = 0.0
     ready_since: float | None = None
+    #: The last result of its readiness check.
     observed: str = ""
+    #: True: a late readiness was reported.
     late: bool = False
+    #: The reason for its state.
     detail: str = ""
+    #: The reported finding and the end of the log, if the run goes on without it.
     failed: tuple[str, ...] = ()
+    #: The parameter file with a description that its node has not read yet.
     description: str = ""
 
     @property
     def alive(self) -> bool:
-        """Whether there is an operating system's process, or will be in a moment."""
+        """Whether the process exists in the operating system, or is about to."""
         return self.state in ("starting", "running", "stopping")
 
     @property
@@ -105,39 +107,38 @@ class Tracked:
 
 @dataclass(frozen=True, slots=True)
 class StopReason:
-    """Why everything stops, and the exit code. ``signals`` counts those that requested it."""
+    """The reason for stopping everything."""
 
     cause: Literal["signal", "time", "taken", "failure"]
     exit_code: int
+    #: Number of signals that requested it.
     signals: int = 0
     signalled: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Everything that is known about a running plan.
-
-    ``clear`` is when the guard reported that no edge of the plan is published yet. ``live`` holds
-    the children of the edges that were received, ``silent`` those that come no more; ``findings``
-    are what the guard sees wrong now. ``reported`` are the codes of the errors that were shown,
-    ``reminded_of`` the missing edges that were named last. ``replanned`` is when another plan
-    came, if one did. ``memory`` is what the guard wants the next one to know; ``unwatched`` is
-    since when it is dead, if it is; ``guard_alive`` when it last reported that it works, and
-    ``guard_overdue`` since when that is missed.
-    """
+    """State of a running plan."""
 
     plan: Plan
     times: Times
     tracked: dict[str, Tracked]
     guard: str | None
     begun: float | None = None
+    #: When another plan arrived; 0: never.
     replanned: float = 0.0
+    #: When the guard reported that no edge of the plan is published yet.
     clear: float | None = None
+    #: Children of the edges that were received.
     live: frozenset[str] = frozenset()
+    #: Children of the edges that are no longer received.
     silent: frozenset[str] = frozenset()
+    #: Current findings of the guard.
     findings: tuple[Finding, ...] = ()
     complete: bool = False
+    #: Codes of the errors that were shown.
     reported: frozenset[str] = frozenset()
+    #: Missing edges in the last notice.
     reminded_of: frozenset[str] = frozenset()
     reminded: float | None = None
     all_started: bool = False
@@ -145,14 +146,18 @@ class State:
     stop: StopReason | None = None
     because: tuple[str, ...] = ()
     finished: bool = False
+    #: State handed to the next guard.
     memory: dict[str, Any] = field(default_factory=dict)
+    #: Since when the guard is dead.
     unwatched: float | None = None
+    #: The guard's last sign of life.
     guard_alive: float | None = None
+    #: Since when a sign of life is overdue.
     guard_overdue: float | None = None
 
     @property
     def missing(self) -> tuple[PlanEdge, ...]:
-        """The edges that were not received yet; none where there is no guard."""
+        """The edges that were not received yet; empty without a guard."""
         return (
             ()
             if self.guard is None
@@ -174,7 +179,7 @@ class State:
 
     @property
     def given_up(self) -> tuple[str, ...]:
-        """The processes that have failed, and without which the run goes on."""
+        """The failed processes without which the run goes on."""
         return tuple(name for name, tracked in self.tracked.items() if tracked.failed)
 
 
@@ -199,7 +204,7 @@ def by_owner(edges: tuple[PlanEdge, ...]) -> tuple[tuple[str, tuple[PlanEdge, ..
 
 
 class Transition:
-    """The step's state and actions, for one step only; its state is replaced, never changed."""
+    """State and actions of one step."""
 
     def __init__(self, state: State, now: float) -> None:
         self.state = state
@@ -212,15 +217,15 @@ class Transition:
         return self.now - (self.state.begun or 0.0)
 
     def update(self, **changes: object) -> None:
-        """Replace what is known."""
+        """Replace fields of the state."""
         self.state = replace(self.state, **changes)  # type: ignore[arg-type]
 
     def track(self, name: str, tracked: Tracked) -> None:
-        """Replace what is known of one process."""
+        """Replace the state of one process."""
         self.update(tracked=self.state.tracked | {name: tracked})
 
     def notify(self, notice: Notice) -> None:
-        """Tell the person."""
+        """Send a notice to the user."""
         self.actions.append(Notify(notice))
 
     def enter(
@@ -235,7 +240,7 @@ class Transition:
         self.notify(ProcessState(name, state, tracked.pid, detail))
 
     def start(self, name: str) -> None:
-        """Have the process started."""
+        """Order the start of a process."""
         order = 1 + max(tracked.order for tracked in self.state.tracked.values())
         before = self.state.tracked[name]
         self.track(name, replace(before, description=""))  # it reads its file
@@ -265,7 +270,7 @@ class Transition:
             self.fail(found)
         elif self.state.stop is None:
             advice = (
-                f"the rest goes on without it: required is false; tfcompose start {name} tries"
+                f"the robot goes on without it: required is false; tfcompose start {name} tries"
                 " again"
             )
             self.report(replace(found, severity="warning", help=advice))
@@ -277,7 +282,7 @@ class Transition:
     def fail(self, found: Finding) -> None:
         """Report the finding and stop everything.
 
-        Once that is under way, further failures follow from it.
+        Does nothing if everything stops already: further failures are consequences.
         """
         if self.state.stop is None:
             self.report(found)

@@ -226,8 +226,8 @@ def refusal(state: State, name: str, verb: Verb) -> str | None:
         return f"{name} is external, and started and stopped elsewhere"
     if name == state.guard and verb != "restart":
         return (
-            f"{name} watches the others and is not stopped alone; tfcompose up --guard off judges"
-            " nobody"
+            f"{name} watches the others and is not stopped alone; tfcompose up --guard off checks"
+            " nothing"
         )
     if verb == "start" and tracked.alive and tracked.leaving != "stop":
         return f"{name} runs already, with pid {tracked.pid}"

@@ -186,6 +186,6 @@ def test_joints_that_no_joint_state_speaks_of_are_named_once_after_5_s_with_who_
     joints.joints(read_own([str(file), "joints"], "joints"), stop)
     assert [[transform.child for transform in decode(each)] for each in sent] == [["right"]]
     (line,) = [each for each in capsys.readouterr().out.splitlines() if "no joint state" in each]
-    who = f"comes from {senders[0]}" if senders else "nobody publishes /rover/joint_states"
+    who = f"comes from {senders[0]}" if senders else "no node publishes /rover/joint_states"
     assert line.startswith("no joint state after 5 s for left: ")
     assert who in line

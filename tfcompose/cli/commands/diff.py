@@ -33,7 +33,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 class Change(NamedTuple):
-    """What is different of a frame, or of the edge to its parent, ``A → B``."""
+    """Difference of a frame, or of the edge to its parent, ``A → B``."""
 
     change: str
     of: str

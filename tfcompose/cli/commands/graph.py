@@ -138,7 +138,7 @@ def _check_output(path: Path) -> None:
 
 
 def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
-    """Return the graph as a file with this ending; only what it needs is loaded."""
+    """Return the graph as a file of this format; import only the modules for it."""
     if ending == ".mmd":
         from tfcompose.compiler.draw.mermaid import mermaid
 
@@ -171,7 +171,7 @@ def _published_graph(arguments: Namespace) -> Graph:
 def graph_of_observers(
     observers: Sequence[TreeObserver], title: str, plan: Plan | None = None, *, poses: bool = False
 ) -> Graph:
-    """Return what was seen as a graph: second parents and loops as they are, publishers as owners.
+    """Return the observed tree as a graph, with second parents, loops and publishers.
 
     What the plan expects and nobody publishes is said to be missing.
     """

@@ -45,7 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Write the files; exit code 0, 2 where one of them is there already or cannot be written."""
+    """Write the files; exit code 0, 2 if one of them exists or cannot be written."""
     if arguments.list:
         width = max(map(len, TEMPLATES))
         print(*(f"{name:<{width}}  {about}" for name, (about, _) in TEMPLATES.items()), sep="\n")
@@ -96,7 +96,7 @@ def _files(template: str, name: str, output: Path, *, with_schema: bool) -> dict
 
 
 def _next(output: Path, text: str) -> list[str]:
-    """Return the next three commands, with what they do."""
+    """Return the next three commands with their purposes."""
     file = "" if str(output) == DEFAULT_FILE else f" {output}"
     profile = " -p demo" if "\nprofiles:" in text else ""
     commands = {

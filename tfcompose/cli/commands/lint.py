@@ -121,7 +121,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def codes(text: str) -> list[str]:
-    """Read codes, or what they begin with, separated by commas.
+    """Read codes or prefixes of codes, separated by commas.
 
     Raises:
         ArgumentTypeError: if there is no such code, or none that may be silenced.
@@ -144,7 +144,7 @@ def codes(text: str) -> list[str]:
 
 
 def run(arguments: Namespace) -> int:
-    """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
+    """Lint the files; exit code 0, 1 with findings that count, 2 if a file cannot be read."""
     from tfcompose.cli.reading import STDIN, read_text
 
     if (arguments.fix or arguments.diff or arguments.watch) and STDIN in arguments.files:

@@ -78,7 +78,7 @@ def since(text: str) -> float:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the logs; exit code 0, 1 where there are none."""
+    """Print the logs; exit code 0, 1 if there are none."""
     from tfcompose.foundation.findings import did_you_mean
     from tfcompose.launcher.output import Follower, logged_processes, read_logs, runs_of
 

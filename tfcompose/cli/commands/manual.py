@@ -23,7 +23,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the page; exit code 2 where there is none."""
+    """Print the page; exit code 2 if there is none."""
     import os
     import pydoc
     import sys

@@ -29,7 +29,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the pose; exit code 1 if a frame is not there, or only a driver knows where it is."""
+    """Print the pose; exit code 1 if a frame does not exist, or only its driver knows the pose."""
     from tfcompose.cli.compiling import compile_or_exit, edges_between
     from tfcompose.compiler.render.pose import pose_json, pose_text
     from tfcompose.foundation.numbers import clean
@@ -61,7 +61,7 @@ def _pose_in_top(chain: list[Edge]) -> Pose:
 
 
 def _moving(edges: list[Edge]) -> str:
-    """Return the line that says what moves on the way, and where it was taken.
+    """Return the line about moving edges in the chain, and the poses assumed for them.
 
     Nothing if nothing does.
     """

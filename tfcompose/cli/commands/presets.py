@@ -45,7 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the list or the page; exit code 1 if there is no such preset, or one that is wrong."""
+    """Print the list or the page; exit code 1 if the preset does not exist or is invalid."""
     from tfcompose.cli import preset_page
     from tfcompose.cli.compiling import library
     from tfcompose.compiler.resolve.presets import node_preset_names

@@ -44,7 +44,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the table; exit code 0, 1 where a robot does not answer, or as --fail-on says."""
+    """Print the table; exit code 0, 1 if a robot does not answer, or as --fail-on requires."""
     from tfcompose.cli.process_table import HEAD, TABLE, row, state_of, uptime
     from tfcompose.launcher.usage import usage_of
 
@@ -100,7 +100,7 @@ def _exit_code(fail_on: str | None, robots: Mapping[str, RobotStatus]) -> int:
 
 
 def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
-    """Return those that answer, by their names, and the exit code: 1 after saying who does not."""
+    """Return the robots that answer, by name, and the exit code: 1 after reporting others."""
     from tfcompose.cli.runs import is_meant, request, running
     from tfcompose.launcher.runtime_dir import RuntimeDirError
     from tfcompose.model.messages import RobotStatus, StatusRequest

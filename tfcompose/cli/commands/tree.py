@@ -174,7 +174,7 @@ def _draw_trees(trees: list[Tree], *, plan: Plan | None) -> str:
 def _wrap_rows(
     branches: Sequence[Branch], rows: Sequence[tuple[str, ...]], columns: int
 ) -> Iterator[str]:
-    """Yield the rows without their columns; what does not fit in a line goes on below."""
+    """Yield the rows without columns; long ones continue on the next line."""
     from tfcompose.cli.tables import shorten
     from tfcompose.compiler.render.tree import wrap_rows
 
@@ -200,7 +200,7 @@ def _colour(column: int, text: str) -> str:
 
 
 def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
-    """Return the columns: frame, kind, node, rate, age, and what there is to say."""
+    """Return the columns: frame, kind, node, rate, age, and remarks."""
     from tfcompose.cli.edge_table import duration
 
     name = branch.indent + printable(branch.frame)
@@ -235,7 +235,7 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
 
 
 def _owner(branch: Branch, plan: Plan | None) -> str:
-    """Return who publishes the frame.
+    """Return the publisher of the frame.
 
     The owner with its node where it is the owner, else the node.
     """

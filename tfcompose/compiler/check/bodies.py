@@ -276,7 +276,7 @@ def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
     for (name, _), links in others.items():
         link_name, material = next(iter(links.items()))
         them = with_more(link_name, len(links) - 1, "link")
-        message = f"material {name} has another colour in {them} than before"
+        message = f"material {name} has another colour in {them} than in its definition"
         notes = [Note(f"{name} is first defined here", first[name].at)]
         advice = "rename one of them"
         if not robot.is_foreign(material.at):

@@ -143,7 +143,7 @@ def rules_of_tools(robot: Robot) -> tuple[list[Rule], list[Finding]]:
             module = vars(load(key.rules)) if key.rules else {}
         except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
             message = f"the rules of {key.name} cannot be loaded: {type(error).__name__}: {error}"
-            advice = f"mend or uninstall it: {key.rules}"
+            advice = f"repair or uninstall it: {key.rules}"
             at = robot.sections[key.name].at()
             found.append(finding("TF921", message, at, help=advice))
             continue

@@ -126,8 +126,8 @@ def view_blocked(robot: Robot) -> Iterator[Finding]:
         worst = max(views, key=lambda view: view.blocked, default=None)
         if worst and worst.blocked > limit:
             message = (
-                f"{_percent(worst.blocked)} of what {sensor.name} sees ({worst.optics.stream}) is"
-                " blocked by "
+                f"{_percent(worst.blocked)} of the view of {sensor.name} ({worst.optics.stream})"
+                " is blocked by "
             )
             message += f"{_some(worst.blocking)}; the limit is {_percent(limit)}"
             advice = "move or turn the sensor, or raise the limit under rules"
@@ -368,7 +368,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
             by = f" by {', '.join(zone.by)}" if zone.by else ""
             message = (
                 f"{_percent(part)} of the zone {zone.name} is seen{by}; at least"
-                f" {_percent(zone.least)} must be"
+                f" {_percent(zone.least)} is required"
             )
             advice = (
                 f"no field of view is known of {', '.join(unknown)}: give optics"

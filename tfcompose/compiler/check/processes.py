@@ -198,8 +198,8 @@ def host_without_processes(robot: Robot) -> Iterator[Finding]:
     for name, host in robot.hosts.items():
         if name not in used and ("hosts", name) not in robot.broken:
             advice = (
-                f"processes: {{static: {{host: {name}}}}} runs all that names no other host, or"
-                " remove it"
+                f"processes: {{static: {{host: {name}}}}} runs every process without a host there,"
+                " or remove it"
             )
             yield finding("TF858", f"no process runs on the host {name}", host.at, help=advice)
 

@@ -181,7 +181,7 @@ def wheels_not_mirrored(robot: Robot) -> Iterator[Finding]:
             if _is_alike(edge, others) and not _is_alike(twin, others):
                 odd, pattern = twin, edge
             right = (pattern.pose.xyz[0], -pattern.pose.xyz[1], pattern.pose.xyz[2])
-            message = f"{odd.child} is not at the mirrored place of {pattern.child}"
+            message = f"{odd.child} is not at the mirrored position of {pattern.child}"
             message += f": [{numbers(odd.pose.xyz)}], and [{numbers(pattern.pose.xyz)}]"
             advice = f"if {pattern.child} is right, write {_origin(robot, odd, right)}"
             notes = [Note(f"{pattern.child} is mounted here", pattern.xyz_at or pattern.at)]

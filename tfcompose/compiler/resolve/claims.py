@@ -313,7 +313,7 @@ class _Claims:
         if claim.off:
             advice += f"; or params: {{{switch_text(claim.off)}}}"
         message = (
-            f"{claimant.process.name} publishes {parent} → {child} by default, which nobody"
+            f"{claimant.process.name} publishes {parent} → {child} by default, which no process"
             " declared"
         )
         self.found.append(finding("TF331", message, claimant.node.at, help=advice))

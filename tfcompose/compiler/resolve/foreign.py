@@ -130,7 +130,7 @@ def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
         if not (disk.is_file(place) or disk.is_folder(place)):
             message, advice = (
                 f"{call[0]}: {place} does not exist",
-                "a path is relative to the file that writes it",
+                "paths are relative to the file that contains them",
             )
             raise RejectedError([finding("TF019", message, at, help=advice)])
         return str(FilePath(place).absolute())

@@ -180,7 +180,9 @@ class _ProcessFiller:
         ):
             message = f"${{file({name})}}: {place} does not exist"
             self.found.append(
-                finding("TF019", message, at, help="a path is relative to the file that writes it")
+                finding(
+                    "TF019", message, at, help="paths are relative to the file that contains them"
+                )
             )
         return f"${{file:{place}}}"
 
@@ -194,7 +196,7 @@ class _ProcessFiller:
         at = self.draft.spec.at(path)
         place = path_named(cwd, at)
         if self.draft.disk and not self.draft.disk.is_folder(place):
-            advice = "a path is relative to the file that writes it"
+            advice = "paths are relative to the file that contains them"
             self.found.append(
                 finding("TF019", f"cwd: the folder {place} does not exist", at, help=advice)
             )
@@ -208,8 +210,8 @@ class _ProcessFiller:
         for key, value in node.params.items() if not can else ():
             if known_at_launch(value):
                 message = (
-                    f"the parameter {key} of {process.name} holds a path that is known at the"
-                    " start only"
+                    f"the parameter {key} of {process.name} contains a path that is known only at"
+                    " the start"
                 )
                 advice = "write it among the arguments of run"
                 place = self.draft.spec.at((*node.path, "params", key))

@@ -133,11 +133,11 @@ def _not_supported(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
         )
         place = spec.at(("guard", "fence")) if spec.spans.has(("guard", "fence")) else at
         yield finding(
-            "TF870", message, place, help="remove fence: strict fences off by remapping then"
+            "TF870", message, place, help="remove fence: the strict guard then uses remapping"
         )
     if ros.rmw == "zenoh" and ros.discovery == "off":
-        message = "rmw: zenoh does not know discovery: off: whoever reaches the router is found"
-        advice = "discovery: localhost, where the router listens to its own computer alone"
+        message = "rmw: zenoh has no discovery: off: every node that reaches the router is found"
+        advice = "discovery: localhost, so that the router accepts only its own computer"
         yield finding("TF870", message, spec.at(("ros", "discovery")), help=advice)
 
 
@@ -153,9 +153,11 @@ def _disagreeing(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
             continue
         path = (*entry_of(process, spec), "env", _RMW)
         place = spec.spans.exactly_at(path) or process.at
-        message = f"{process.name} is given {_RMW}={own}, and the robot has rmw: {robot.ros.rmw}"
+        message = f"{process.name} gets {_RMW}={own}, but the robot has rmw: {robot.ros.rmw}"
         notes = [Note("set here", spec.at(("ros", "rmw")))]
-        advice = f"remove {_RMW} from its env: {process.name} finds none of the others with it"
+        advice = (
+            f"remove {_RMW} from its env: {process.name} cannot find the other processes with it"
+        )
         yield finding("TF871", message, place, notes=notes, help=advice)
 
 
@@ -163,9 +165,13 @@ def _wrong_routers(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     routers = _routers(robot)
     for more in routers[1:]:
         notes = [Note(f"{routers[0].name} is defined here", routers[0].at)]
-        message = f"{more.name} is a second router of Zenoh, beside {routers[0].name}"
+        message = f"{more.name} is a second Zenoh router, in addition to {routers[0].name}"
         yield finding(
-            "TF872", message, more.at, notes=notes, help="remove one: all processes use the same"
+            "TF872",
+            message,
+            more.at,
+            notes=notes,
+            help="remove one: all processes share one router",
         )
     if not routers or robot.ros.router:
         return
@@ -183,7 +189,7 @@ def _wrong_routers(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
         declared = robot.hosts.get(home or "")
         address = declared.ssh.rpartition("@")[2] if declared else "ADDRESS"
         message = (
-            f"what runs on {names} does not reach {router.name}, which runs on"
+            f"processes on {names} cannot reach {router.name}, which runs on"
             f" {home or 'another computer'}"
         )
         advice = f"ros: {{router: tcp/{address}:7447}}, the address of {home or 'that computer'}"

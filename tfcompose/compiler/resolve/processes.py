@@ -411,7 +411,7 @@ def _idle_of_containers(spec: RobotSpec) -> Iterator[Finding]:
         for key in container.model_fields_set - works if container.external else ():
             message, advice = (
                 f"{name} is external, so {key} has no effect",
-                "remove it: it is for whoever starts it",
+                "remove it, or set it where the process is started",
             )
             yield finding("TF851", message, spec.at_key(("containers", name, key)), help=advice)
 
@@ -490,8 +490,8 @@ def check_arguments(draft: Draft) -> Iterator[Finding]:
 
 def _not_reached(key: str, process: Process, at: Span) -> Finding:
     """Return a warning about a key for ROS arguments that a shell or launch file drops."""
-    advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
-    message = f"{key} does not reach {process.name}, which a shell reads"
+    advice = f"write it into the command: --ros-args {_WORDS[key]}; or give run as a list"
+    message = f"{key} does not reach {process.name}, whose run is a shell command"
     if process.argv[:2] == ROS2_LAUNCH:
         advice = (
             "write run: {launch: package/file.launch.py}, or an argument that the launch file"

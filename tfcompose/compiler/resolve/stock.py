@@ -43,8 +43,8 @@ def stock_faults(robot: Robot) -> Iterator[Finding]:
             and not (edge.child in described and edge.child != robot.base)
         ):
             message = (
-                f"the joint {edge.joint.name} is not below {robot.base}, and a stock {NAME}"
-                " publishes only what is"
+                f"the joint {edge.joint.name} is not below {robot.base}, but a stock {NAME}"
+                " publishes only joints below it"
             )
             advice = "state_publisher: tfcompose, or another base"
             yield finding("TF315", message, edge.joint.at, help=advice)

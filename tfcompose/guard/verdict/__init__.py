@@ -1,4 +1,4 @@
-"""Judges what was observed against what the plan expects.
+"""Compares observations with the plan.
 
 For the guard, doctor, verify and monitor.
 

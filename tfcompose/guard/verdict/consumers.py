@@ -50,14 +50,11 @@ def data_frame_unknown(state: TreeState) -> Iterator[Finding]:
             continue
         who_sends = listed(each.nodes) or "somebody"
         if not each.frame:
-            message = (
-                f"{each.topic} from {who_sends} has no frame_id, so nobody can say where it was"
-                " measured"
-            )
+            message = f"{each.topic} from {who_sends} has no frame_id, so its position is unknown"
             yield finding("TF840", message, None, help="set the driver's frame_id")
             continue
         message = (
-            f"{each.topic} from {who_sends} is in the frame {each.frame}, which nobody publishes"
+            f"{each.topic} from {who_sends} is in the frame {each.frame}, which no node publishes"
         )
         plain = each.frame.removeprefix("/")
         otherwise = (

@@ -121,7 +121,7 @@ _SINGLE_FROM = 3
 
 
 def cost(state: TreeState) -> str:
-    """Return what the topic of moving edges costs; empty where nothing came.
+    """Return the traffic on the topic of moving edges; empty without messages.
 
     Each message goes to each listener: what sends several edges does so with one.
     """

@@ -237,7 +237,7 @@ def not_taken(
     found: dict[str, Value | None],
     drives: tuple[Driven, ...] = (),
 ) -> list[Finding]:
-    """Return a finding for each parameter of the node that is not what the plan wrote.
+    """Return a finding for each parameter of the node that differs from the plan.
 
     None: it has no such one.
     """

@@ -75,7 +75,7 @@ class Fault:
 
     @property
     def who(self) -> str:
-        """The publisher, as people read it."""
+        """The publisher for display."""
         if len(self.nodes) > 1:
             return f"one of {', '.join(self.nodes)}"
         name = self.nodes[0] if self.nodes else "somebody" if self.recorded else NAMELESS
@@ -109,7 +109,7 @@ class Fault:
 
     @property
     def is_of_stamps(self) -> bool:
-        """Whether it is about stamps, and over as soon as these are right."""
+        """Whether it concerns stamps, and ends with the first correct one."""
         return self.code in _OF_STAMPS
 
 
@@ -138,7 +138,7 @@ def _over_text(fault: Fault, more: int = 0, *, kept: bool = False, who: str = ""
 
 @dataclass(frozen=True, slots=True)
 class FaultGroup:
-    """Faults that one finding reports, one for each edge, and what is known of the publishers."""
+    """Faults in one finding, one for each edge, and the state of their publishers."""
 
     faults: Sequence[Fault]
     plan: Plan
@@ -189,7 +189,7 @@ def group_of(
 
 
 def fault_finding(group: FaultGroup, place: Span | None = None) -> Finding:
-    """Return the finding for a group; ``place`` is where the first edge is in the robot's file."""
+    """Return the finding for a group; ``place`` is the span of the first edge."""
     first = group.first
     is_mild = first.code in _WARNINGS or (
         first.code == UNDECLARED and group.plan.guard.unknown_edges == "warn"
@@ -255,7 +255,7 @@ def _wrong_topic(group: FaultGroup) -> tuple[str, str]:
 def _loop(group: FaultGroup) -> tuple[str, str]:
     first = group.first
     message = tree.loop_message(first.loop, closed_by=f"{group.edges} from {first.who}")
-    return message, tree.loop_help(f"end {first.whom}")
+    return message, tree.loop_help(f"stop {first.whom}")
 
 
 def _self(group: FaultGroup) -> tuple[str, str]:
@@ -265,7 +265,7 @@ def _self(group: FaultGroup) -> tuple[str, str]:
 def _two_publishers(group: FaultGroup) -> tuple[str, str]:
     names = [group.first.who, group.first.detail]
     message = publishers.two_publishers_message(group.edges, names, are_many=bool(group.more))
-    advice = "end one of them, or let each send a frame of its own: tf2 takes whatever came last"
+    advice = f"stop one of them, or give each its own frame: {tree.LAST_WINS}"
     return message, advice
 
 
@@ -338,12 +338,12 @@ def other_robot_finding(faults: Sequence[Fault], run: OtherRun, plan: Plan) -> F
 
 
 def _leave_out_help(group: FaultGroup) -> str:
-    """Return what to do about a publisher of another's edge, or one with the wrong parent."""
+    """Return the help for a publisher without the edge, or with a wrong parent."""
     first, plan = group.first, group.plan
     if first.namesake:
-        return f"end {first.whom}: is the robot running twice? tf2 takes whatever came last"
+        return f"stop {first.whom}: is the robot running twice? {tree.LAST_WINS}"
     if first.recorded:
-        return "tf2 takes whatever came last"
+        return tree.LAST_WINS
     if process := _run_by(first, plan):
         owns = f", or own it: owner: {process}" if first.code == NOT_OWNER else ""
         component = plan.process(process).component
@@ -351,11 +351,11 @@ def _leave_out_help(group: FaultGroup) -> str:
         return f"let {first.who}{which} leave {first.child} out{owns}"
     if first.nodes == (NO_NODE,):
         return (
-            f"end {first.whom}, or start it with another DDS domain: ss -lunp lists the programs"
+            f"stop {first.whom}, or start it with another DDS domain: ss -lunp lists the programs"
             " that use UDP ports of DDS, which begin at 7400"
         )
     its = "their" if first.publishers > 1 else "its"
-    return f"end {first.whom}, or switch {its} TF off; tf2 takes whatever came last"
+    return f"stop {first.whom} or disable {its} TF output; {tree.LAST_WINS}"
 
 
 def _run_by(fault: Fault, plan: Plan) -> str:
@@ -368,7 +368,7 @@ def _run_by(fault: Fault, plan: Plan) -> str:
 
 
 def _misnamed_help(group: FaultGroup) -> str:
-    """Return what to do where the owner itself sends the edges, by a node of another name."""
+    """Return the help if the owner sends the edges with another node name."""
     first = group.first
     if first.code != NOT_OWNER or first.namesake or len(first.nodes) != 1 or first.edge is None:
         return ""
@@ -409,7 +409,7 @@ def _sent_by_driver(group: FaultGroup) -> str:
 
 
 def _driver_help(group: FaultGroup) -> str:
-    """Return what to do about a driver, or nothing."""
+    """Return the help about a sensor's driver, or an empty text."""
     first, driven = group.first, group.driven
     if driven is None or first.code not in {*_OTHERWISE, NOT_OWNER}:
         return ""
@@ -426,7 +426,7 @@ def _driver_help(group: FaultGroup) -> str:
 
 
 def _switch_help(group: FaultGroup) -> str:
-    """Return what to set, where it is known that the node publishes the edge by default."""
+    """Return the parameter to set, if the node publishes the edge by default."""
     first = group.first
     claim = group.plan.claim_on(first.nodes, first.parent, first.child)
     if claim is None or first.namesake:
@@ -438,7 +438,7 @@ def _switch_help(group: FaultGroup) -> str:
 
 
 def _child_pattern(group: FaultGroup) -> str:
-    """Return the child, or a pattern where all are one name with numbers: ``tag_*``."""
+    """Return the child, or a pattern if the names differ only in numbers: ``tag_*``."""
     children = [fault.child for fault in group.faults]
     stems = {child.rstrip("0123456789") for child in children}
     if len(children) > 1 and len(stems) == 1 and "" not in stems:

@@ -1,4 +1,4 @@
-"""Joint states: who waits for them, who sends them, and of which joints.
+"""Joint states: their subscribers, publishers and joints.
 
 A moving joint needs its state from one publisher: a listener takes whatever comes, so the frames
 jump between the positions of two.
@@ -60,13 +60,13 @@ def no_joint_states(state: TreeState) -> Iterator[Finding]:
             continue
         edges = listed([f"{joint.parent} → {joint.child}" for joint in missing])
         message = (
-            f"{listed(nodes)} waits for {topic.name}, which nobody publishes; missing: {edges}"
+            f"{listed(nodes)} waits for {topic.name}, which no node publishes; missing: {edges}"
         )
         yield finding("TF843", message, None, help=_sender_help(state))
 
 
 def _sender_help(state: TreeState) -> str:
-    """Return who should publish joint states: the process that simulates them, or ROS's own."""
+    """Return the expected publisher of joint states: the simulating process, or ROS's nodes."""
     simulating = [
         process
         for process in (state.plan.processes if state.plan else ())
@@ -112,7 +112,7 @@ def _missing(state: TreeState) -> list[MovingJoint]:
 
 
 def _moving_joints(state: TreeState) -> Sequence[MovingJoint]:
-    """Return the moving joints of the robot's description; of the plan where there is none."""
+    """Return the moving joints of the robot's description, or of the plan if there is none."""
     if state.moving_joints or state.plan is None:
         return state.moving_joints
     return [
@@ -198,7 +198,7 @@ def sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
 
 
 def _together(senders: Sequence[SentJoints]) -> list[SentJoints]:
-    """Return those that sent while another one did, and did not only replace it."""
+    """Return the publishers that sent at the same time as another one."""
     return [
         sender
         for sender in senders
@@ -212,7 +212,7 @@ def _together(senders: Sequence[SentJoints]) -> list[SentJoints]:
 
 
 def unknown_joints(senders: Sequence[SentJoints], known: Collection[str]) -> Iterator[Finding]:
-    """Find joints that the robot does not have; none where nothing is known of its joints."""
+    """Find joints that the robot does not have; none if its joints are unknown."""
     for sender in senders if known else ():
         unknown = sorted(sender.joints.difference(known))
         if not unknown or not sender.node:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: bool) -> str:
-    """Return the code of what is wrong with a planned edge that came with ``parent``, or nothing.
+    """Return the code of the fault of a planned edge received with ``parent``, or an empty text.
 
     ``static`` says that it came on /tf_static, ``owner`` that its owner may have sent it, ``sure``
     that no other node can have.
@@ -24,7 +24,7 @@ def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: boo
 
 
 def relays_of(plan: Plan) -> frozenset[str]:
-    """Return the nodes that may pass on what others own: the strict guards of all hosts."""
+    """Return the nodes that may forward edges of others: the strict guards of all hosts."""
     hosts = {None, *(process.host for process in plan.processes)}
     return frozenset(node for host in hosts for node in plan.guards_of(host))
 
@@ -32,5 +32,5 @@ def relays_of(plan: Plan) -> frozenset[str]:
 def may_be_owners(
     edge: PlanEdge, nodes: Sequence[str], relays: frozenset[str] = frozenset()
 ) -> bool:
-    """Return whether one of the nodes is the edge's owner, or passes on what the owner sends."""
+    """Return whether one of the nodes is the edge's owner, or forwards its messages."""
     return edge.node in nodes or not relays.isdisjoint(nodes)

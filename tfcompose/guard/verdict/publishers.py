@@ -67,8 +67,8 @@ def flood(node: str, where: str, transforms: int, hertz: float | None) -> Findin
     """
     rate = f" at {hertz:.3g} Hz" if hertz else ""
     message = (
-        f"{node} sends {transforms:,} frames{rate}, more than are judged: only its declared"
-        " edges are"
+        f"{node} sends {transforms:,} frames{rate}, more than the guard checks: now it"
+        " checks only the declared edges of this node"
     )
     notes = [Note(f"{node} runs {where}")] if where else []
     return finding(
@@ -106,13 +106,13 @@ def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: boo
     ``profile`` is the profile file that it was started with instead of the fence's; empty: none.
     """
     message = (
-        f"{node} of {process} publishes {topic} past the fence of guard: strict: every listener"
-        " receives it"
+        f"{node} of {process} publishes {topic} without passing the strict guard: every"
+        " listener receives it"
     )
     if remapped:
         advice = (
             "let it take ROS arguments: start it as {package, executable}, or add --ros-args to"
-            " its words; "
+            " its command; "
         )
         advice += 'a script passes them on with "$@"'
         return finding("TF852", message, None, help=advice)
@@ -125,12 +125,12 @@ def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: boo
     notes = [Note(f"it runs {how}")]
     if profile:
         advice = (
-            f"take {variable} out of the script, and name the file in the robot's file, where the"
-            " fence is added "
+            f"take {variable} out of the script, and name the file in the robot file, so that the"
+            " partition is added "
         )
         advice += f"to it: processes: {{{process}: {{env: {{{variable}: {profile}}}}}}}"
     else:
-        advice = f"let the script keep {variable}, which names the fence"
+        advice = f"let the script keep {variable}, which sets the partition"
     advice += '; or, with a script that passes "$@" on, guard: {fence: remap}'
     return finding("TF852", message, None, notes=notes, help=advice)
 
@@ -141,7 +141,7 @@ def unmarked(node: str, topic: str, where: str, *, remapped: bool) -> Finding:
     It runs ``where``, and is not behind the fence, which may be of remappings.
     """
     message = (
-        f"{node} publishes {topic} past the fence of guard: strict: every listener receives it"
+        f"{node} publishes {topic} without passing the strict guard: every listener receives it"
     )
     notes = [Note(f"it runs {where}, and what started it cleared its environment")]
     advice = "start it without env -i, and with sudo -E where it needs sudo: "
@@ -178,7 +178,7 @@ def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Fin
         f"{node} sent {lost} on /tf_static before the guard received it, and none since contains"
         f" {named}"
     )
-    advice = "send all fixed edges in each message: a latched topic keeps the last one only"
+    advice = "send all fixed edges in each message: a latched topic keeps only the last one"
     return finding("TF850", message, None, severity="warning", help=advice)
 
 
@@ -228,9 +228,9 @@ def two_publishers(state: TreeState) -> Iterator[Finding]:
         notes = [Note(_where(state, edge)) for edge in rivals]
         notes += [Note(others[0].name) for others in found[1:8]]
         advice = (
-            "end one of them, or switch its TF off"
+            "stop one of them, or disable its TF output"
             if len(names) > 1
-            else f"{names[0]} runs twice: end one"
+            else f"{names[0]} runs twice: stop one"
         )
         yield finding("TF822", message, None, severity="warning", notes=notes, help=advice)
 
@@ -270,14 +270,14 @@ def volatile_static(state: TreeState) -> Iterator[Finding]:
 
 
 def volatile_reader(state: TreeState) -> Iterator[Finding]:
-    """A node listens to fixed frames so that it misses those that were sent before it came."""
+    """A node's subscription misses fixed frames that were sent before it joined."""
     if state.volatile_readers and any(publisher.static for publisher in state.publishers):
         listen = "listens" if len(state.volatile_readers) == 1 else "listen"
         message = (
             f"{listed(state.volatile_readers)} {listen} to {state.topics[1]} with durability"
             " volatile: "
         )
-        message += "what was sent before is missed"
+        message += "earlier messages are missed"
         advice = (
             "subscribe with durability transient_local, reliable, depth 100, as tf2_ros's"
             " TransformListener does"
@@ -346,7 +346,7 @@ def many_static(state: TreeState) -> Iterator[Finding]:
 
 
 def isolation_leak(state: TreeState) -> Iterator[Finding]:
-    """A node of a robot with TF topics of its own writes the global ones."""
+    """A node of a robot with separate TF topics publishes on the global ones."""
     topics = {topic.name: topic for topic in state.typed(TF_MESSAGE)}
     own = (
         {node for process in state.plan.processes for node in process.nodes}
@@ -403,7 +403,7 @@ def show_pose(pose: Pose) -> str:
 
 
 def compare(expected: Pose, observed: Pose) -> str:
-    """Return both poses as people read them."""
+    """Return both poses for display."""
     return f"seen {show_pose(observed)}; expected {show_pose(expected)}"
 
 
@@ -435,8 +435,8 @@ def pose_differs(
         [] if place else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
     )
     advice = (
-        "was it changed after the start? tfcompose up restarts what differs; else correct the one"
-        " that is wrong"
+        "if the file changed after the start, run tfcompose up again: it restarts the processes"
+        " that differ; otherwise correct the wrong one"
     )
     return finding(
         "TF846", f"{message}: {compare(edge.pose, pose)}", place, notes=notes, help=advice

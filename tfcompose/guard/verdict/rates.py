@@ -40,7 +40,7 @@ NAMED_AT_MOST = 6
 
 
 def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Finding:
-    """Return the finding for edges of one owner that did not come."""
+    """Return the finding for edges of one owner that were not received."""
     are_many = len(edges) > 1
     named = with_more(edges[0].name, len(edges) - 1)
     message = (
@@ -64,7 +64,7 @@ def silent(
     over: bool = False,
     gone: bool = False,
 ) -> Finding:
-    """Return the finding for edges of one owner that did not come for so long.
+    """Return the finding for edges of one owner that were not received for ``seconds``.
 
     ``over`` says that they came again after that, ``gone`` that the owner's publisher has left.
     """
@@ -131,8 +131,8 @@ def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are na
 
 
 def _unlatched_finding(publisher: str, names: Sequence[str], place: Span | None = None) -> Finding:
-    message = f"{publisher} has left: nobody latches {listed(names)} any more"
-    advice = "listeners that are there keep these frames; those that join later do not get them"
+    message = f"{publisher} has left: no node latches {listed(names)} any more"
+    advice = "current listeners keep these frames; later ones do not get them"
     return finding("TF804", message, place, help=advice)
 
 
@@ -191,7 +191,7 @@ def low_rate(state: TreeState) -> Iterator[Finding]:
 
 
 def gap(state: TreeState) -> Iterator[Finding]:
-    """An edge comes often, and then not at all for a while."""
+    """An edge with a high rate pauses."""
     rated = state.rated
     parents = Counter(child for _, child in {(edge.parent, edge.child) for edge in state.moving})
     for edge in state.moving:
@@ -247,14 +247,14 @@ def _speed(state: TreeState, edge: EdgeState) -> float:
 
 
 def least_of(edge: EdgeState, inside: set[str]) -> float:
-    """Return the least rate of an edge in hertz; 0 where any will do."""
+    """Return the minimum rate of an edge in hertz; 0 if there is none."""
     stream = edge.stream
     named = LEAST.get((stream.parent.rpartition("/")[2], stream.child.rpartition("/")[2]))
     return named or (LEAST_INSIDE if stream.child in inside else 0.0)
 
 
 def is_silent(edge: EdgeState) -> bool:
-    """Whether a moving edge that came often does not come any more."""
+    """Whether a moving edge has stopped after a steady rate."""
     count = edge.stream.arrivals.count
     span_s = (edge.stream.arrivals.last_ns - edge.stream.first_ns) / 1e9
     period_s = span_s / (count - 1) if count >= FEWEST else float("inf")

@@ -25,7 +25,7 @@ MOST_SETTINGS = MOST_PROCESSES = 3
 
 
 def settings_text(settings: Mapping[str, str]) -> str:
-    """Return the settings as people read them."""
+    """Return the settings for display."""
     settings_shown = [f"{name}={settings[name]}" for name in VARIABLES if settings.get(name)]
     if not settings.get(DOMAIN):
         settings_shown.insert(0, f"{DOMAIN} unset (0)")
@@ -33,20 +33,20 @@ def settings_text(settings: Mapping[str, str]) -> str:
 
 
 def elsewhere_help(elsewhere: Sequence[str]) -> str:
-    """Return what to do where no TF came and there is some on other topics, or none."""
+    """Return the help for missing TF, depending on TF on other topics."""
     if elsewhere:
         return f"there is TF on {listed(elsewhere)}: {namespace_options(elsewhere)}"
     return "is the robot running, and with these settings? tfcompose doctor looks for the reason"
 
 
 def no_tf(state: TreeState) -> Iterator[Finding]:
-    """Nobody publishes TF here."""
+    """No node publishes TF here."""
     if state.publishers or state.edges or state.malformed:
         return
     moving, fixed = state.topics
     others = plural(len(state.nodes), "other node") if state.nodes else "no other node"
-    message = f"nobody publishes {moving} or {fixed}; in {state.seconds:.1f} s {others} "
-    message += "was seen" if len(state.nodes) < 2 else "were seen"  # noqa: PLR2004 (one, or none)
+    message = f"no node publishes {moving} or {fixed}; in {state.seconds:.1f} s {others} "
+    message += "was found" if len(state.nodes) < 2 else "were found"  # noqa: PLR2004 (one, or none)
     notes = [Note(f"seen: {listed(state.nodes)}")] if state.nodes else []
     notes.append(Note(f"looked with {settings_text(state.settings)}"))
     if state.plan:
@@ -124,7 +124,7 @@ def _elsewhere(state: TreeState) -> list[str]:
 
 
 def settings_contradict(state: TreeState) -> Iterator[Finding]:
-    """Variables that set up ROS say what cannot be, or contradict each other."""
+    """Environment variables of ROS are invalid, or contradict each other."""
     settings = state.settings
     value = settings.get(RANGE, "")
     if settings.get(LOCALHOST_ONLY) == "1":
@@ -150,7 +150,7 @@ def settings_contradict(state: TreeState) -> Iterator[Finding]:
             help="ROS takes SUBNET instead, with a warning",
         )
     elif value == "OFF":
-        message = f"{RANGE}=OFF: nodes discover nobody, not even on this machine"
+        message = f"{RANGE}=OFF: nodes discover no other node, not even on this machine"
         yield finding(
             "TF909",
             message,

@@ -1,4 +1,4 @@
-"""Simulators that publish a tree of their own, and how each is stopped from it."""
+"""Simulators that publish a second tree, and the way to turn it off."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def offset_name(ahead_s: float) -> str:
 
 
 def _is_since_boot(stamp_ns: int, received_ns: int) -> bool:
-    """Whether a stamp is the age of this machine, when it came; of a recording it is not."""
+    """Whether a stamp equals the uptime of this machine; never for a recording."""
     uptime_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
     then_ns = received_ns - (time.time_ns() - uptime_ns)
     return 0 < then_ns <= uptime_ns and abs(stamp_ns - then_ns) <= KEPT_NS
@@ -135,7 +135,7 @@ def message(code: str, publisher: str, edges: str, detail: str) -> str:
 
 
 def advice(code: str, detail: str) -> str:
-    """Return what to do about it."""
+    """Return the help."""
     if code == REPEATED:
         return (
             "tf2 drops all but the first; stamp with the time of the measurement, or send when"
@@ -143,13 +143,13 @@ def advice(code: str, detail: str) -> str:
         )
     if code == BACK:
         return (
-            "tf2 sorts it in behind newer ones, or drops it; was a bag or a simulation started"
+            "tf2 inserts it before newer ones, or drops it; was a bag or a simulation started"
             " again, or a clock set?"
         )
     if detail == "without a stamp":
         simulated = "a node with use_sim_time stamps 0 while nothing publishes /clock"
         return f"{simulated}; otherwise set header.stamp from the node's clock"
-    apart = "no lookup can combine it with the rest"
+    apart = "no lookup can combine it with other transforms"
     if "simulated" in detail or "/clock" in detail:
         return f"{apart}: use_sim_time must be the same for all nodes, and agree with ros.clock"
     return f"{apart}: is a bag played without --clock, or a machine's clock not in sync?"
@@ -339,7 +339,7 @@ def host_clock_off(state: TreeState) -> Iterator[Finding]:
             )
         else:
             message = (
-                f"what {listed(nodes)}{there} sends arrives {duration(skew)} after it was sent"
+                f"messages of {listed(nodes)}{there} arrive {duration(skew)} after they were sent"
             )
         advice = (
             "bring the machines' clocks together (chrony, or timedatectl set-ntp true); stamps"
@@ -381,7 +381,7 @@ def clock_missing(state: TreeState) -> Iterator[Finding]:
         )
         users = users if topic.readers else "the plan's clock is sim"
         if not topic.publishers:
-            message = f"{users}, and nobody publishes /clock"
+            message = f"{users}, but no node publishes /clock"
             advice = "start the simulator, play the bag with --clock, or set use_sim_time: false"
             yield finding("TF836", message, None, help=advice)
         elif not state.clock_moves:
@@ -437,7 +437,7 @@ def _repeats(edge: EdgeState) -> bool:
 
 
 def _stands_with_the_clock(state: TreeState, edge: EdgeState) -> bool:
-    """Whether its stamps are those of a /clock that stands, which is a finding of its own."""
+    """Whether its stamps are those of a /clock that does not move (another finding)."""
     return (
         state.clock_ns is not None
         and not state.clock_moves

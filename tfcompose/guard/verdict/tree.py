@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.state import TreeState
 
 
-#: So many publishers are named of one frame.
+#: The most publishers of one frame that have a note each.
 MOST_NOTES = 8
+#: The effect of two publishers of one frame.
+LAST_WINS = "tf2 keeps the last transform it received"
 _FIX = "fix what the node computes it from; until then the frame does not exist"
 _FIX_SOME = "fix what the node computes it from; tf2 uses the messages before and after"
 _NORMALISE = (
-    "bring it to length 1 in the node: RViz shows the frame anyway, since tf2 on Jazzy normalises"
-    " it, but stricter readers drop it"
+    "normalise it in the node: RViz shows the frame anyway, because tf2 on Jazzy normalises it,"
+    " but stricter readers drop it"
 )
 
 
@@ -37,14 +39,14 @@ def way(frames: Sequence[str]) -> str:
 
 
 def loop_message(frames: Sequence[str], closed_by: str = "") -> str:
-    """Return the message for a loop of frames, and for who closed it, if known."""
+    """Return the message for a loop of frames, with the publisher that closed it, if known."""
     return f"the frames {way(frames)} form a loop" + (
         f", closed by {closed_by}" if closed_by else ""
     )
 
 
 def loop_help(end: str) -> str:
-    """Return what to do about a loop: ``end`` somebody, or else."""
+    """Return the help for a loop; ``end`` is the advice to stop a node."""
     return f"{end}, or swap parent and child of that edge: tf2 finds no way through a loop"
 
 
@@ -53,11 +55,11 @@ def self_message(edges: str, publisher: str) -> str:
     return f"{publisher} publishes {edges}, a frame as its own parent, which tf2 drops"
 
 
-SELF_HELP = "give the node's child frame another name, or switch its TF off"
+SELF_HELP = "give the node's child frame another name, or disable its TF output"
 
 
 def two_parents_message(child: str, parents: Sequence[tuple[str, str]]) -> str:
-    """Return the message for a frame with several parents, each with who publishes it."""
+    """Return the message for a frame with several parents, each with its publisher."""
     by_parent: dict[str, list[str]] = {}
     for parent, publisher in parents:
         by_parent.setdefault(parent, []).append(publisher)
@@ -161,10 +163,10 @@ def second_parent(state: TreeState) -> Iterator[Finding]:
         message = two_parents_message(child, [(edge.parent, who(edge)) for edge in edges])
         notes = [Note(_describe_edge(state, edge)) for edge in edges[:MOST_NOTES]]
         nodes = {who(edge) for edge in edges}
-        advice = f"let one node publish {child}: end the other, or switch its TF off"
+        advice = f"let one node publish {child}: stop the other, or disable its TF output"
         if len(nodes) == 1:
-            advice = f"let {nodes.pop()} send one of them, or end it if it runs twice"
-        advice += "; tf2 takes whatever came last"
+            advice = f"let {nodes.pop()} send one of them, or stop it if it runs twice"
+        advice += f"; {LAST_WINS}"
         yield finding("TF802", message, None, notes=notes, help=advice)
 
 
@@ -201,7 +203,7 @@ def trees_of(state: TreeState) -> dict[str, set[str]]:
 
 
 def _bridge(state: TreeState, root: str, main: set[str], own: set[str]) -> str:
-    """Return what would connect the tree below ``root`` with the main one."""
+    """Return the help to connect the tree below ``root`` with the main one."""
     for edge in state.plan.edges if state.plan else ():
         if (edge.parent in main) != (edge.child in main) and (edge.parent in own) != (
             edge.child in own

@@ -1,4 +1,4 @@
-"""Compares a plan with what was observed, a running tree or a recording, edge by edge.
+"""Compares a plan with a running tree or a recording, edge by edge.
 
 What is fixed is compared by value: what tfcompose publishes itself, what another owner sends on
 /tf_static with a pose that the robot says, and of a joint what its motion leaves as it is. Frames
@@ -80,7 +80,7 @@ class Difference:
 
 
 def differences(state: TreeState, plan: Plan, tolerance: Offset = SAME_POSE) -> list[Difference]:
-    """Return what differs from the plan: edge by edge in its order, then what is not in it."""
+    """Return the differences from the plan: its edges in order, then undeclared ones."""
     comparison = _Comparison(state, plan, tolerance)
     planned = [difference for edge in plan.edges for difference in comparison.of_planned(edge)]
     return [*planned, *comparison.find_undeclared()]
@@ -190,7 +190,7 @@ class _Comparison:
         return Difference(code, edge, observed, fault)
 
     def _twice(self, edge: PlanEdge, some: Sequence[EdgeState]) -> Iterator[Difference]:
-        """Judge publishers that all have the owner's name: there is one too many."""
+        """Judge several publishers with the owner's name."""
         namesakes: dict[bytes | None, EdgeState] = {}
         for observed in sorted(some, key=lambda observed: observed.stream.first_ns):
             if (
@@ -228,7 +228,7 @@ class _Comparison:
             yield Difference("TF846", edge, observed, off=off)
 
     def _off(self, edge: PlanEdge, pose: Pose) -> Offset | None:
-        """Return how far the pose is from what is fixed of it, None where nothing is."""
+        """Return the deviation from the fixed part of the pose; None if no part is fixed."""
         off = offset_of(edge.pose, pose)
         if edge.joint is not None:
             if edge.joint.type in _TURNING:
@@ -265,7 +265,7 @@ def _times(edge: PlanEdge, observed: EdgeState, *, simulated: bool) -> Iterator[
 
 
 def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
-    """Return what to do about an edge that never came."""
+    """Return the help for an edge that was never received."""
     planned = {edge.child for edge in plan.edges}
     strangers = [edge.child for edge in state.edges if edge.child not in planned]
     advice = did_you_mean(edge.child, strangers)
@@ -427,7 +427,7 @@ def _poses(group: Group, place: Span | None) -> Finding:
 
 
 def differs_from_plan(state: TreeState) -> Iterator[Finding]:
-    """What is published differs from the plan."""
+    """The published tree differs from the plan."""
     if state.plan is None or not (state.edges or state.publishers):
         return  # nobody publishes at all, which is another finding
     found = [
@@ -439,7 +439,7 @@ def differs_from_plan(state: TreeState) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What is wrong with an edge, nothing if all is as expected.
+    """Result for an edge; without findings if it is as expected.
 
     ``owner`` is None where nobody declared it, and empty for what is wrong with the whole tree.
     """
@@ -536,5 +536,5 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     planned = [verdict for verdict in verdicts if verdict.owner]
     right = sum(not verdict.found for verdict in planned)
     extra = sum(verdict.owner is None for verdict in verdicts)
-    more = f", {extra} that nobody declared" if extra else ""
+    more = f", {extra} not declared" if extra else ""
     return f"{right} of {len(planned)} edges as expected{more}"

@@ -104,5 +104,5 @@ class _Missing:
         return (
             f"{self._topic} comes from {', '.join(names)}"
             if names
-            else f"nobody publishes {self._topic}"
+            else f"no node publishes {self._topic}"
         )

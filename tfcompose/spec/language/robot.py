@@ -365,8 +365,8 @@ class PartSpec(MountKeys):
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*MountKeys.EXCLUSIVE, frozenset(PART_KINDS))
     NEEDS_PARENT: ClassVar[str] = (
-        "its own file says where a part without a parent is: add parent: FRAME, or let the process"
-        " that publishes its first moving edge begin elsewhere"
+        "the pose of a part without a parent comes from its own file: add parent: FRAME, or change"
+        " the start pose in the process that publishes its first moving edge"
     )
 
     spec: Text | None = key(None, "a robot file, relative to this file", "rover.yaml")

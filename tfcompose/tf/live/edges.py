@@ -1,8 +1,8 @@
 """Observation of edges for monitor, verify, view and doctor: publisher, rate and delay of each.
 
-An observer is given messages as they come, from a subscription or a bag, and who is in the graph;
-it reads no clock and no topic. What it keeps does not grow with time, and with strange names up to
-a bound only. Times are nanoseconds.
+An observer takes messages from a subscription or a bag, and the endpoints of the graph; it reads
+no clock and no topic. Its memory does not grow with time, and is bounded for publishers that
+invent names. Times are nanoseconds.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.tf_codec import Row
 
 
-#: So long after an edge first came its times are not counted: a new subscriber gets at once what
-#: was kept.
+#: Arrivals within this time after the first one are not counted: a new subscriber gets all latched
+#: messages at once.
 SETTLE_S = 0.3
-#: A frame that stays in each parent for so many transforms, or more, in the mean, is handed over.
+#: A frame is handed over if it stays in each parent for at least this many transforms, on average.
 MIN_RUN = 3
 #: A shorter quaternion is no rotation.
 LEAST_LENGTH = 1e-9
@@ -39,10 +39,7 @@ _SECOND_NS = 1_000_000_000
 def nearer_clock(
     rows: Sequence[Row], received_ns: int, clock_ns: int | None, *, static: bool
 ) -> int | None:
-    """Return the time to compare stamps with.
-
-    That of /clock where they are nearer to it, else None.
-    """
+    """Return the time of /clock if stamps are nearer to it than to ``received_ns``."""
     if clock_ns is None or static or not rows:
         return None
     stamp_ns = rows[0][2] * _SECOND_NS + rows[0][3]
@@ -51,61 +48,58 @@ def nearer_clock(
 
 @dataclass(slots=True)
 class EdgeStream:
-    """An edge, as one publisher sends it on one kind of topic.
+    """One edge from one publisher on one kind of topic.
 
-    Frames have the names that tf2 gives them: without the slash that some nodes write in front.
-
-    Attributes:
-        parent: the frame in which the pose is given.
-        child: the frame whose pose it is.
-        static: whether it came on /tf_static.
-        gid: the publisher's id, 16 bytes; None where that is not known, as in a bag.
-        arrivals: when it came; ``arrivals.count`` are all, ``arrivals.last_ns`` is when the newest
-            came.
-        first_ns: when the first message came, by the receiver's clock.
-        row: the newest transform.
-        stamp_ns: the newest message's stamp.
-        newest_ns: the largest stamp so far.
-        oldest_ns: the stamp of the first message.
-        delay_ns: how old the newest message's stamp was when it came; negative: ahead of the
-            receiver's clock.
-        stamps_back: how many stamps were before the one that came before them.
-        stamps_repeated: how many stamps were the one that came before them.
-        rejected: why tf2 does not take it, the newest time that it did not.
-        rejected_row: the newest that it did not take.
-        rejections: how many were not taken.
-        slashed: whether a name came with a slash in front.
-        handover: the edges that put this frame in other parents, from the same publisher, and this
-            one; None if none does.
-        begun: how often this one came after another of them.
+    Frame names are as in tf2, without a leading slash.
     """
 
+    #: The frame in which the pose is given.
     parent: str
+    #: The frame whose pose it is.
     child: str
+    #: True: received on /tf_static.
     static: bool
+    #: The publisher's id, 16 bytes; None if unknown, as in a bag.
     gid: bytes | None
+    #: Arrival times: ``arrivals.count`` of all messages, ``arrivals.last_ns`` of the newest.
     arrivals: Arrivals
+    #: Arrival of the first message, by the receiver's clock.
     first_ns: int
+    #: The newest transform.
     row: Row
+    #: The largest stamp so far.
     newest_ns: int = -1
+    #: The stamp of the newest message.
     stamp_ns: int = -1
+    #: The stamp of the first message.
     oldest_ns: int = -1
+    #: Arrival of the newest message minus its stamp; negative: stamped ahead of the receiver's
+    #: clock.
     delay_ns: int = 0
+    #: Number of stamps before their predecessor.
     stamps_back: int = 0
+    #: Number of stamps equal to their predecessor.
     stamps_repeated: int = 0
+    #: The reason of tf2's last rejection.
     rejected: Rejection | None = None
+    #: The last transform that tf2 rejects.
     rejected_row: Row | None = None
+    #: Number of transforms that tf2 rejects.
     rejections: int = 0
+    #: True: a name came with a leading slash.
     slashed: bool = False
+    #: The edges from the same publisher that give this frame different parents, including this
+    #: one; None: this is the only one.
     handover: Handover | None = None
+    #: Number of times that this edge followed another edge of ``handover``.
     begun: int = 0
 
     @property
     def is_taken(self) -> bool:
-        """Whether tf2 takes any of it.
+        """Whether tf2 accepts any of its transforms.
 
-        tf2 on Jazzy makes a matrix of a quaternion before it looks at it, which normalises one of
-        another length than 1; one of length 0 stays none.
+        tf2 on Jazzy converts a quaternion to a matrix before it checks the length, and so
+        normalises it. A quaternion of length 0 remains invalid.
         """
         if self.rejections < self.arrivals.count:
             return True
@@ -114,12 +108,12 @@ class EdgeStream:
 
     @property
     def pose(self) -> Pose:
-        """The newest pose of the child in the parent, as it was sent; nothing is normalised."""
+        """The newest pose of the child in the parent, as sent, without normalisation."""
         return Pose(self.row[4:7], self.row[7:11])
 
     @property
     def speed(self) -> float:
-        """How fast its stamps advance, in seconds per second; 1 where that is unknown."""
+        """Advance of its stamps in seconds per second; 1 if unknown."""
         took_ns, stamped_ns = (
             self.arrivals.last_ns - self.first_ns,
             self.newest_ns - self.oldest_ns,
@@ -127,7 +121,7 @@ class EdgeStream:
         return stamped_ns / took_ns if took_ns > 0 and stamped_ns > 0 else 1.0
 
     def take(self, row: Row, received_ns: int, clock_ns: int) -> None:
-        """Note a transform; ``clock_ns`` is the time that its stamp is compared with."""
+        """Add a transform; its stamp is compared with ``clock_ns``."""
         stamp_ns = row[2] * _SECOND_NS + row[3]
         self.row = row
         if stamp_ns > self.newest_ns:
@@ -155,7 +149,7 @@ class EdgeStream:
             self._reject()
 
     def _reject(self) -> None:
-        """Count the newest transform as one that tf2 does not take, if that is so."""
+        """Count the newest transform as rejected if tf2 rejects it."""
         why = rejection_of(self.parent, self.child, self.row[4:])
         if why is not None:
             self.rejected, self.rejected_row, self.rejections = why, self.row, self.rejections + 1
@@ -163,23 +157,21 @@ class EdgeStream:
 
 @dataclass(slots=True)
 class Handover:
-    """The edges with which one publisher puts one frame now in this parent, now in that.
-
-    And which came last.
-    """
+    """The edges with which one publisher gives one frame alternating parents."""
 
     streams: list[EdgeStream]
+    #: The edge that was received last.
     holder: EdgeStream
 
     def join(self, stream: EdgeStream) -> None:
-        """Count an edge among them."""
+        """Add an edge."""
         self.streams.append(stream)
         if len(self.streams) > 1:
             for each in self.streams:
                 each.handover = self
 
     def take(self, stream: EdgeStream) -> bool:
-        """Note a transform of one publisher; return whether the previous was another's."""
+        """Add a transform; return whether the previous one was of another edge."""
         if stream is self.holder:
             return False
         self.holder = stream
@@ -188,16 +180,16 @@ class Handover:
 
     @property
     def is_one(self) -> bool:
-        """Whether the frame changes hands, now and then.
+        """Whether the frame changes parents from time to time.
 
-        Where one comes between the others, it jumps to and fro.
+        If the edges alternate all the time, the frame jumps instead.
         """
         return all((each.begun - 1) * MIN_RUN <= each.arrivals.count for each in self.streams)
 
 
 @dataclass(slots=True)
 class Traffic:
-    """How many messages a publisher sent on the topic of moving edges, and transforms in them."""
+    """Messages of a publisher on the topic of moving edges, and transforms in them."""
 
     messages: int = 0
     transforms: int = 0
@@ -205,19 +197,17 @@ class Traffic:
 
 @dataclass(frozen=True, slots=True)
 class EdgeState:
-    """What is known of an edge from one publisher at one time.
-
-    ``nodes`` are the nodes of which one is the publisher: one where that is certain, none where
-    nobody has a name. ``age_s`` is the time since the newest message came, ``data_age_s`` that
-    since the newest stamp, None for fixed edges; ``present`` says that the publisher is in the
-    graph, None where there is none to ask.
-    """
+    """State of an edge from one publisher at one time."""
 
     stream: EdgeStream
+    #: Candidates for the publisher: one if it is certain, empty if no publisher has a name.
     nodes: tuple[str, ...]
     timing: Timing
+    #: Time since the newest message arrived.
     age_s: float
+    #: Time since the newest stamp; None for fixed edges.
     data_age_s: float | None
+    #: True: the publisher is in the graph; None: there is no graph.
     present: bool | None = None
 
     @property
@@ -232,17 +222,17 @@ class EdgeState:
 
     @property
     def known_s(self) -> float:
-        """The time since its first message came."""
+        """Time since the first message arrived."""
         return self.age_s + (self.stream.arrivals.last_ns - self.stream.first_ns) * 1e-9
 
     @property
     def name(self) -> str:
-        """The edge as people read it."""
+        """The edge for display."""
         return f"{self.parent} → {self.child}"
 
     @property
     def publisher(self) -> str:
-        """The publisher as people read it, empty where nothing is known."""
+        """The publisher for display, empty if unknown."""
         return (
             self.nodes[0]
             if len(self.nodes) == 1
@@ -254,29 +244,27 @@ class EdgeState:
 
 @dataclass(slots=True)
 class TreeObserver:
-    """Everything that was observed of a TF tree.
+    """Observations of a TF tree."""
 
-    ``window_s`` is the stretch of time to which rates, jitter, gaps and delays refer (one to two
-    of them); 0: all. Of the first ``settle_s`` of each edge they take nothing. ``end_ns`` is when
-    a recording ended, of any topic; 0 for a running tree, of which ``observed_ns`` says when what
-    had come was taken last. ``nodes`` are the names of all nodes in the graph, ``sent_joints`` who
-    sent joint states, where that is observed. ``beyond`` counts
-    the transforms of edges that are not kept, by their publisher's id: so many edges of one
-    publisher, and of all together, are.
-    """
-
+    #: Time window of rates, jitter, gaps and delays (one to two windows); 0: everything.
     window_s: float = 0.0
+    #: The first part of each edge that these ignore.
     settle_s: float = 0.0
     messages: int = 0
     sent: dict[bytes | None, Traffic] = field(default_factory=dict)
     begun_ns: int = 0
     last_ns: int = 0
+    #: End of a recording, of any topic; 0 for a running tree.
     end_ns: int = 0
+    #: When messages of a running tree were last taken.
     observed_ns: int = 0
+    #: Transforms of edges beyond the bounds, which are not kept, by publisher id.
     beyond: dict[bytes | None, int] = field(default_factory=dict)
     malformed: dict[bytes | None, int] = field(default_factory=dict)
     publishers: Publishers = field(default_factory=Publishers)
+    #: Names of all nodes in the graph.
     nodes: tuple[str, ...] = ()
+    #: Senders of joint states, if these are observed.
     sent_joints: tuple[SentJoints, ...] = ()
     _streams: dict[tuple[str, str, bytes | None, bool], EdgeStream] = field(default_factory=dict)
     _counts: dict[bytes, int] = field(default_factory=dict)
@@ -291,9 +279,14 @@ class TreeObserver:
         received_ns: int,
         clock_ns: int | None = None,
     ) -> None:
-        """Take a message; ``clock_ns`` is the time that stamps should have.
+        """Take a message.
 
-        It is ``received_ns`` unless given.
+        Args:
+            rows: its transforms.
+            static: whether it came on /tf_static.
+            gid: the publisher's id; None if unknown.
+            received_ns: its arrival.
+            clock_ns: the time to compare stamps with; default: ``received_ns``.
         """
         self.begun_ns = self.begun_ns or received_ns
         self.messages += 1

@@ -221,7 +221,7 @@ def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
         advice = f"install ros-{_release(ros)}-tf2-msgs, or use {IMPLEMENTATIONS['fastdds']}"
         return finding(
             "TF901",
-            f"with {name} the package tf2_msgs is needed, and is not installed",
+            f"{name} needs the package tf2_msgs, but it is not installed",
             None,
             help=advice,
         )

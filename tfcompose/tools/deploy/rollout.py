@@ -276,7 +276,7 @@ class Rollout:
         for share in sorted(self.shares, key=lambda share: share.name):
             answer = await self._ask(share, "take_lock", who=who)
             if answer["holder"]:
-                message = f"{share.name} is being deployed to by {answer['holder']}"
+                message = f"{answer['holder']} is deploying to {share.name}"
                 raise RejectedError(
                     [finding("TF915", message, share.host.at, help="wait until that has ended")]
                 )
@@ -422,7 +422,7 @@ class Rollout:
         plan, robot, at = self.target.plan, state["robot"], share.host.at
         notes = [Note(line) for line in state["lines"]]
         if robot is None or state["failed"]:
-            what = "ends again and again" if state["failed"] else "does not run"
+            what = "keeps exiting" if state["failed"] else "does not run"
             return [finding("TF917", f"{plan.robot} {what} on {share.name}", at, notes=notes)]
         expected = set(self._edges())
         missing = [
@@ -464,15 +464,15 @@ class Rollout:
             if isinstance(answer, BaseException):
                 notes.append(
                     Note(
-                        f"{share.name} {answer}; it goes back by itself when it can, or when it"
-                        " boots"
+                        f"{share.name} {answer}; it returns to the previous release when it can,"
+                        " or at its next boot"
                     )
                 )
             elif answer is None:
                 continue
             elif answer["release"]:
-                runs = "and runs it" if answer["active"] else "which does not run, as before"
-                notes.append(Note(f"{share.name} is back on release {answer['release']}, {runs}"))
+                runs = "" if answer["active"] else ", which does not run, as before"
+                notes.append(Note(f"{share.name} returned to release {answer['release']}{runs}"))
             else:
                 notes.append(Note(f"{share.name} had no release before, and runs nothing"))
         return notes
@@ -557,7 +557,7 @@ def target_of(
     if nowhere := without_computer(plan):
         message = f"{listed(nowhere, NAMED_AT_MOST)} would run on no host"
         advice = (
-            "what names no host runs where static does: processes: {static: {host:"
+            "processes without a host run where static does: processes: {static: {host:"
             f" {next(iter(plan.hosts))}}}}}"
         )
         raise RejectedError([finding("TF912", message, None, help=advice)])
@@ -598,8 +598,8 @@ def _clocks_apart(offsets: Mapping[str, float], target: DeployTarget) -> Iterabl
 _AGREED = {"ROS_DOMAIN_ID": "0", "RMW_IMPLEMENTATION": "the default", "ROS_LOCALHOST_ONLY": "0"}
 #: The key that decides it for all hosts.
 _HOLDS = {
-    "ROS_DOMAIN_ID": "ros: {domain_id: N} holds for all hosts",
-    "RMW_IMPLEMENTATION": "ros: {rmw: fastdds}, or another, holds for all hosts",
+    "ROS_DOMAIN_ID": "set it for all hosts: ros: {domain_id: N}",
+    "RMW_IMPLEMENTATION": "set it for all hosts: ros: {rmw: fastdds}, or another",
 }
 
 

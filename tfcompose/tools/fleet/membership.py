@@ -113,7 +113,7 @@ def _unknown_edges(
     for index, shared in enumerate(fleet.edges_of(name)):
         if shared.ends in edges:
             continue
-        message = f"the fleet has {name} share {' → '.join(shared.ends)}, which is no edge of it"
+        message = f"{name} shares {' → '.join(shared.ends)} in the fleet, but has no such edge"
         notes = [Note("it is shared here", fleet_source.at((*inside, index)))]
         advice = did_you_mean(
             " → ".join(shared.ends), named, "an edge is a parent and its child on the live tree"

@@ -30,7 +30,9 @@ _PERIODS = 4.0
 #: By so much the clocks of two computers may differ, in seconds.
 CLOCK_S = 0.5
 _RETRY_S = 1.0
-_LATE = "is its link slow? else its clock is behind: chrony, or systemd-timesyncd"
+_LATE = (
+    "its link is slow, or its clock is behind (synchronise it with chrony or systemd-timesyncd)"
+)
 _SECOND_NS = 1_000_000_000
 
 LinkState = Literal["live", "stale", "silent", "unreachable"]
@@ -270,21 +272,26 @@ class FleetObserver:
 def problems_of(robot: FleetRobotStatus) -> Iterator[Finding]:
     """Yield what is wrong with a robot."""
     if robot.state == "unreachable":
-        ago = f", and nothing came for {robot.age_s:.1f} s" if robot.age_s is not None else ""
+        ago = (
+            f", and there was no message for {robot.age_s:.1f} s"
+            if robot.age_s is not None
+            else ""
+        )
         advice = (
-            "is the robot on, and in this network? its router is the process zenoh_router, or"
+            "is the robot on, and in this network? Its router is the process zenoh_router, or"
             " zenohd"
         )
         yield finding(
             "TF882",
-            f"the router of {robot.robot} at {robot.router} is not reached{ago}",
+            f"the router of {robot.robot} at {robot.router} cannot be reached{ago}",
             None,
             help=advice,
         )
         return
     if robot.state == "stale":
         message = (
-            f"the link to {robot.robot} is stale: what came last was sent {robot.age_s:.1f} s ago"
+            f"the link to {robot.robot} is stale: its last message was sent"
+            f" {robot.age_s:.1f} s ago"
         )
         advice = (
             _LATE
@@ -295,13 +302,13 @@ def problems_of(robot: FleetRobotStatus) -> Iterator[Finding]:
         return
     if robot.state == "silent":
         advice = f"start it on the robot: tfcompose fleet share {robot.robot}"
-        message = f"{robot.robot} shares nothing: its router is reached, and nothing came"
+        message = f"{robot.robot} shares nothing: its router can be reached, but no message came"
         yield finding("TF883", message, None, help=advice)
         return
     if robot.delay_s > CLOCK_S:
         yield finding(
             "TF885",
-            f"what {robot.robot} sends comes {robot.delay_s:.1f} s after it was sent",
+            f"messages of {robot.robot} arrive {robot.delay_s:.1f} s after they were sent",
             None,
             help=_LATE,
         )
@@ -309,9 +316,9 @@ def problems_of(robot: FleetRobotStatus) -> Iterator[Finding]:
         name = f"{edge.parent} → {edge.child}"
         if edge.age_s is None or edge.stale:
             when = (
-                "never came"
+                "was never received"
                 if edge.age_s is None
-                else f"was sent {edge.age_s:.1f} s ago for the last time"
+                else f"was last sent {edge.age_s:.1f} s ago"
             )
             advice = "does the robot publish it under these names? tfcompose doctor on the robot"
             yield finding("TF884", f"{name} of {robot.robot} {when}", None, help=advice)

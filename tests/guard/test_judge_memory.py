@@ -279,4 +279,4 @@ def test_an_owner_whose_node_has_another_name_is_advised_to_declare_it_and_not_t
     (found,) = running.judge.tick(running.now + 0.2)
     assert isinstance(found, FindingShown)
     assert (found.found.code, "node: /other" in found.found.help) == ("TF801", ours)
-    assert found.found.help.startswith("end /other") is not ours
+    assert found.found.help.startswith("stop /other") is not ours

@@ -279,7 +279,7 @@ def test_a_program_without_ros_is_called_one_and_not_by_what_the_middleware_call
     running.repeat(running.joins(NO_NODE, process=""), "map odom", 3)
     found = running.only()
     expect(found, "TF801", NO_NODE)
-    assert found.help.startswith("end it")
+    assert found.help.startswith("stop it")
 
 
 # A process of a strict plan that is not behind its fence.

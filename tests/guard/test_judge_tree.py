@@ -41,7 +41,7 @@ def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop
     running = History(policy).clear()
     running.repeat(running.joins("/rogue"), "base map", 5)
     expect(
-        running.only(), "TF820", "map → odom → base → map", "base → map from /rogue", "end /rogue"
+        running.only(), "TF820", "map → odom → base → map", "base → map from /rogue", "stop /rogue"
     )
     assert running.only().severity == "error"
 
@@ -195,7 +195,7 @@ def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_ou
     history.repeat(history.joins("/mapper"), edges, 5).repeat(history.joins("/rogue"), edges, 5)
     own, stranger = history.found()
     expect(own, own.code, advice)
-    expect(stranger, own.code, "end /rogue")
+    expect(stranger, own.code, "stop /rogue")
 
 
 # Floods: what nobody declared is judged up to a bound, what is declared always.

@@ -160,7 +160,7 @@ def test_a_release_that_does_not_come_up_is_taken_back_everywhere(
         True,
     ), done
     for name in NAMES:
-        assert f"{name} is back on release {before[name]}" in done.stderr
+        assert f"{name} returned to release {before[name]}" in done.stderr
     assert current(computers) == before
     assert until(lambda: is_complete(computers)), journals(computers)
     assert deploy(computers, ROBOT, "--check").returncode == 0
@@ -247,7 +247,7 @@ def test_a_host_that_loses_power_in_the_middle_takes_all_back(
         computers.boot("rear")
     assert (process.returncode, "rear is lost" in errors) == (1, True), errors
     for name in ("brain", "arm"):
-        assert f"{name} is back on release {before[name]}" in errors
+        assert f"{name} returned to release {before[name]}" in errors
     assert current(computers) == before
     assert until(lambda: is_complete(computers)), journals(computers)
 

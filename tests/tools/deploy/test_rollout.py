@@ -95,7 +95,7 @@ def test_a_host_that_runs_the_release_goes_on() -> None:
     [
         ("stop", LostError("is lost: the connection has ended"), "jetson is lost"),
         ("start", RefusedError("systemctl start: no"), "systemctl start: no"),
-        ("wait", {"robot": None, "failed": True, "lines": ["error: x"]}, "ends again and again"),
+        ("wait", {"robot": None, "failed": True, "lines": ["error: x"]}, "keeps exiting"),
         (
             "wait",
             STATUS | {"robot": RUNNING | {"missing": ["base_link → arm"]}},
@@ -107,7 +107,7 @@ def test_a_host_that_runs_the_release_goes_on() -> None:
 def test_whatever_fails_on_one_host_takes_all_back(request_: str, answer: Any, says: str) -> None:
     main, jetson = StandInHost("main"), StandInHost("jetson", {request_: answer})
     found = rejected(main, jetson)
-    expect(found[0], "TF917", says, "main is back on release before")
+    expect(found[0], "TF917", says, "main returned to release before")
     assert main.requests[-1] == jetson.requests[-1] == "back"
 
 

@@ -25,7 +25,7 @@ from tests.support.domains import reserved_domain
 
 #: Seconds a contender gets to end after Ctrl-C before it is killed.
 END_S = 20.0
-Unit = Literal["s", "ms", "µs", "MB", "kB", "% of a core", "%", "times", "a second"]
+Unit = Literal["s", "ms", "µs", "MB", "kB", "% of a core", "%", "times", "findings"]
 Statistic = Literal["least", "median", "p90", "worst"]
 
 

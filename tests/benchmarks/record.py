@@ -35,7 +35,7 @@ class Result:
     #: The machine's load of the last minute, before and after: runnable processes.
     load: tuple[float, float]
     machine: dict[str, Any]
-    #: Contenders with their versions.
+    #: Versions of contenders that have one.
     versions: dict[str, str]
     #: Contenders that the machine does not have, with the reason.
     missing: dict[str, str]

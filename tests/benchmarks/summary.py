@@ -68,6 +68,8 @@ def number(value: float) -> str:
 
 def quantity(value: float, unit: Unit | str) -> str:
     """Return a value with its unit."""
+    if unit == "findings":
+        return f"{value:g}"
     return number(value) if unit == "times" else f"{number(value)} {unit}"
 
 

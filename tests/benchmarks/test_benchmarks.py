@@ -196,7 +196,7 @@ def test_a_result_survives_the_file_and_others_are_kept(tmp_path: Path) -> None:
     record.write({"trial": result()}, file)
     assert record.read(file) == {"other": result(), "trial": result()}
     assert '"peer": [2.0, 2.0, 2.0]' in file.read_text("utf-8")
-    assert result().versions == {"tfcompose": "", "peer": "1.2"}
+    assert result().versions == {"peer": "1.2"}
     assert result().missing == {"absent": "not installed: pip install absent"}
 
 

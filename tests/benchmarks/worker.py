@@ -23,13 +23,14 @@ def result_of(
 ) -> Result:
     """Return what was measured, with the machine, the day, and the load of a minute before."""
     contenders = benchmark.contenders
+    installed = {one.name: one.version() for one in contenders if not one.missing()}
     return Result(
         about=benchmark.about,
         command=f"python -m tests.benchmarks --only {benchmark.name}",
         date=datetime.now(timezone.utc).date().isoformat(),
         load=(round(load, 2), round(os.getloadavg()[0], 2)),
         machine=machine(),
-        versions={one.name: one.version() for one in contenders if not one.missing()},
+        versions={name: version for name, version in installed.items() if version},
         missing={one.name: one.missing() for one in contenders if one.missing()},
         rows={
             name: RowResult(row.title, row.unit, samples[name])

@@ -77,6 +77,6 @@ BENCHMARK = Benchmark(
         "changed": Row("… with one process changed, on one host", "s"),
     },
     contenders={Contender(TFCOMPOSE.name, missing): deployed},
-    runs=5,
+    runs=3,
     quick_runs=1,
 )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from tests.benchmarks.benchmark import Sampler, Workspace
 
-SETTLE_S, SECONDS, QUICK_SECONDS = 5.0, 30.0, 5.0
+SETTLE_S, SECONDS, QUICK_SECONDS = 3.0, 10.0, 5.0
 TUTORIAL = ("up", str(ROOT / "robots" / "autonomous_robot.yaml"), "--profile", "demo")
 
 

@@ -38,6 +38,6 @@ BENCHMARK = Benchmark(
     about="from the start of a program until a stock listener that was there has all fixed edges",
     rows={"listener": Row(f"start: {EDGES} fixed edges are at a listener after", "s")},
     contenders={contender: opened(command) for contender, command in COMMANDS.items()},
-    runs=10,
+    runs=8,
     warm_ups=1,
 )

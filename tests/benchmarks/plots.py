@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tests.benchmarks.benchmark import TFCOMPOSE
 from tests.benchmarks.summary import quantity, ratios, summary
@@ -39,28 +40,29 @@ def plot(results: Mapping[str, Result], folder: Path) -> list[Path]:
 def _ratios(results: Mapping[str, Result]) -> Figure | None:
     """Draw the ratio of tfcompose to each peer, on a logarithmic scale, with its spread."""
     bars = [
-        (f"{row.title}, to {peer}", summary(ratios(row.samples[TFCOMPOSE.name], values)))
-        for result in results.values()
+        (f"{name}: {row.title}, to {peer}", summary(ratios(row.samples[TFCOMPOSE.name], values)))
+        for name, result in results.items()
         for row in result.rows.values()
         for peer, values in row.samples.items()
         if peer != TFCOMPOSE.name and all(values)
     ]
     if not bars:
         return None
-    figure = Figure(figsize=(9, 1 + 0.3 * len(bars)), layout="constrained")
+    figure = Figure(figsize=(9, 1 + 0.4 * len(bars)), layout="constrained")
     axes: Any = figure.subplots()
     for position, (_, ratio) in enumerate(reversed(bars)):
         axes.plot([ratio.low, ratio.high], [position, position], color=_COLOURS[1], linewidth=2)
         axes.plot([ratio.median], [position], "o", color=_COLOURS[0])
     axes.axvline(1, color="black", linewidth=0.8)
     axes.set_xscale("log")
+    low, high = min(bar.low for _, bar in bars), max(bar.high for _, bar in bars)
+    axes.set_xlim(min(0.5, 0.8 * low), max(2, 1.25 * high))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_ylim(-0.7, len(bars) - 0.3)
-    axes.set_yticks(range(len(bars)), [_plain(title) for title, _ in reversed(bars)])
-    axes.set_xlabel(
-        "tfcompose / peer, pairs of a round: median, 10th to 90th percentile; less is better"
-    )
+    axes.set_yticks(range(len(bars)), [_label(title) for title, _ in reversed(bars)], fontsize=7)
+    axes.set_xlabel("tfcompose / peer; less is better")
     axes.grid(axis="x", alpha=0.3)
     return figure
 
@@ -97,6 +99,10 @@ def _row(axes: Any, row: RowResult) -> None:
     axes.set_xlim(left=0)
     axes.set_title(f"{_plain(row.title)} [{row.unit}]", fontsize=8, loc="left")
     axes.grid(axis="x", alpha=0.3)
+
+
+def _label(text: str) -> str:
+    return textwrap.fill(_plain(text), 60)
 
 
 def _plain(text: str) -> str:

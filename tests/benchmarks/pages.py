@@ -26,7 +26,10 @@ def with_tables(text: str, results: Mapping[str, Result]) -> str:
 
     def replace(match: re.Match[str]) -> str:
         recorded = [results[name] for name in match[2].split() if name in results]
-        return match[1] + (table(recorded) if recorded else "")
+        if not recorded:
+            return match[1]
+        is_apart = match[3] or match.end() == len(text)
+        return match[1] + table(recorded) + ("" if is_apart else "\n")
 
     return _TABLE.sub(replace, text)
 

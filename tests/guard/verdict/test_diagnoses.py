@@ -24,7 +24,7 @@ from tests.support.tree_history import (
 from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.text import duration
 from tfcompose.guard.verdict.doctor import diagnose, examine
-from tfcompose.guard.verdict.setup import settings_apart
+from tfcompose.guard.verdict.setup import MOST_PROCESSES, MOST_SETTINGS, settings_apart
 from tfcompose.guard.verdict.stamps import other_clock
 from tfcompose.model.plan import EdgePattern, GuardPolicy, PlanProcess
 from tfcompose.tf.live.publishers import Publisher
@@ -180,6 +180,7 @@ CASES: dict[str, tuple[TreeState, set[str]]] = {
         now_and_then(*(n / 4 for n in range(8)), *(n / 4 for n in range(13, 20))).observed(),
         {"TF838"},
     ),
+    "data without a tree": (TreeHistory().observed(stamped=data("laser", 0.0)), set()),
     "an allowed edge": (
         sound_tree()
         .moving("base_link tag_1", b"x")
@@ -465,6 +466,20 @@ def test_processes_with_other_settings_are_searched_where_there_is_no_tf_below_a
     assert codes(observed) == {"TF845", "TF908"}
     below = (TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),)
     assert codes(replace(observed, graph=below)) == {"TF845"}
+
+
+def test_of_many_other_settings_some_are_named_and_some_processes_of_each() -> None:
+    domains = [8] * (MOST_PROCESSES + 2) + list(range(9, 9 + MOST_SETTINGS))
+    started = tuple(
+        RosProcess(pid, "nav", {"ROS_DOMAIN_ID": str(domain)})
+        for pid, domain in enumerate(domains, 100)
+    )
+    found = [one for one in diagnose(TreeState(SECONDS, processes=started)) if one.code == "TF908"]
+    assert len(found) == MOST_SETTINGS == 3
+    many = diagnose(TreeState(SECONDS, processes=started[: MOST_PROCESSES + 2]))
+    [of_one] = [one for one in many if one.code == "TF908"]
+    assert len(of_one.notes) == MOST_PROCESSES + 1
+    assert of_one.notes[-1].message == "and 2 more"
 
 
 def test_processes_with_other_settings_cannot_be_heard_and_why_is_reported() -> None:

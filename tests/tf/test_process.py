@@ -7,6 +7,7 @@ from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan import PlanProcess, Simulation
 from tfcompose.tf.process import Own, read_own, start
+from tfcompose.tf.ros.environment import RosError
 
 
 def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
@@ -69,3 +70,16 @@ def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
     monkeypatch.setattr("tfcompose.tf.process.missing_ros", lambda: "no rclpy: install it")
     assert start([str(write([], PlanProcess("static", "static"))), "static"], "static", never) == 1
     assert _last_error(capsys) == "no rclpy: install it\n"
+
+
+def test_what_ros_refuses_ends_with_code_1_and_its_words(
+    write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(_own: Own, _stop: Stop) -> None:
+        raise RosError("ROS cannot start a node")
+
+    monkeypatch.setattr("tfcompose.tf.process.missing_ros", lambda: None)
+    monkeypatch.setattr("tfcompose.tf.process.child_environment", lambda *_, **__: {})
+    file = str(write([], PlanProcess("static", "static")))
+    assert start([file, "static"], "static", refused) == 1
+    assert _last_error(capsys) == "ROS cannot start a node\n"

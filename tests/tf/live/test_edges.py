@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tfcompose.tf.live import edges as module
-from tfcompose.tf.live.edges import EdgeState, TreeObserver
+from tfcompose.tf.live.edges import EdgeState, TreeObserver, nearer_clock
 from tfcompose.tf.live.publishers import Publisher
 from tfcompose.tf.tf2.exceptions import Rejection
 
@@ -208,3 +208,17 @@ def test_one_who_floods_the_tree_leaves_room_for_others(monkeypatch: pytest.Monk
     assert {one.child for one in observer.edges(S) if one.stream.gid == B} == {
         f"own_{number}" for number in range(5)
     }
+
+
+@pytest.mark.parametrize(
+    ("stamp_s", "clock_s", "nearer"),
+    [(99, 5, False), (6, 5, True), (52, 5, True), (53, 5, False), (99, None, False)],
+)
+def test_a_stamp_is_compared_with_the_clock_that_it_is_nearer_to(
+    stamp_s: int, clock_s: int | None, *, nearer: bool
+) -> None:
+    rows = [("odom", "base_link", stamp_s, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]
+    clock_ns = None if clock_s is None else clock_s * S
+    expected = clock_ns if nearer else None
+    assert nearer_clock(rows, 100 * S, clock_ns, static=False) == expected
+    assert nearer_clock(rows, 100 * S, clock_ns, static=True) is None

@@ -44,6 +44,12 @@ def test_a_message_and_the_graph_name_the_same_publisher(node: Any) -> None:
     assert {writer.type for writer in named.values()} == {"tf2_msgs/msg/TFMessage"}
 
 
+@pytest.mark.parametrize(("static", "topic"), [(False, "/tf"), (True, "/tf_static")])
+def test_publishers_and_readers_are_on_tf2s_topics(node: Any, topic: str, *, static: bool) -> None:
+    assert TFPublisher(node, static=static).publisher.topic_name == topic
+    assert TFSubscription(node, static=static).topic == topic
+
+
 def test_take_returns_everything_in_order_and_then_nothing(node: Any) -> None:
     publisher, subscription = TFPublisher(node, static=False), TFSubscription(node, static=False)
     assert until(lambda: publisher.publisher.get_subscription_count() == 1)

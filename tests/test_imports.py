@@ -335,6 +335,7 @@ def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> No
             "parser",
             "robot_search",
             "schemas",
+            "start_command",
             "terminal",
             "tool_commands",
         )

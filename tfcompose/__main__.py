@@ -21,9 +21,9 @@ def run() -> int:
     sys.path[:] = [folder for folder in sys.path if folder not in dropped]
     if "tfcompose" not in sys.modules:
         _load_package()
-    from tfcompose.launcher.program import PROCESSES, run_process
+    from tfcompose.launcher.program import is_process, run_process
 
-    if sys.argv[1:2] and sys.argv[1] in PROCESSES:
+    if is_process(sys.argv[1:]):
         return run_process()
     from tfcompose.cli import main as run_command
 

@@ -27,6 +27,7 @@ from tfcompose.cli.commands import (
     events,
     explain,
     graph,
+    guard,
     init,
     lint,
     logs,
@@ -63,6 +64,7 @@ GROUPS: dict[str, dict[str, CommandModule]] = {
     },
     "Run": {
         "up": up,
+        "guard": guard,
         "down": down,
         "ps": ps,
         "logs": logs,

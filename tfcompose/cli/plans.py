@@ -16,7 +16,7 @@ from tfcompose.foundation.reading import is_file, read_bytes
 from tfcompose.model.files import with_absolute_addresses
 from tfcompose.model.plan import Plan
 from tfcompose.model.plan.file import read_plan, write_plan
-from tfcompose.model.plan.hosts import share_of
+from tfcompose.model.plan.hosts import share_of, with_guard_alone
 from tfcompose.model.variables import SETTLE
 
 if TYPE_CHECKING:
@@ -113,6 +113,8 @@ def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
     if arguments.guard:
         plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
     plan = host_share(plan, arguments.host, os.uname().nodename)
+    if arguments.guard_alone:
+        plan = with_guard_alone(plan)
     if arguments.settle is None:
         return plan
     env = {SETTLE: str(arguments.settle)}

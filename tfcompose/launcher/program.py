@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 PYTHON_PATH = "PYTHONPATH"
 #: The processes of tfcompose's own, by the kind that plans and supervisors name, with the module
@@ -41,6 +41,17 @@ ANYWHERE_PARTS = (
     " from tfcompose.__main__ import run; sys.exit(run())",
 )
 ANYWHERE = "".join(ANYWHERE_PARTS)
+
+
+def is_process(argv: Sequence[str]) -> bool:
+    """Return whether a command line starts one of tfcompose's own processes, and no command.
+
+    ``guard`` is both: the process is given a plan and its name.
+    """
+    kind, *first = [*argv, "-", "-", "-"][:3]
+    if kind == "guard" and any(text.startswith("-") or ":=" in text for text in first):
+        return False
+    return kind in PROCESSES
 
 
 def run_process() -> int:

@@ -12,6 +12,7 @@ import psutil
 import pytest
 
 from tests.support import processes
+from tests.support.adoption import PUBLISHERS, hand_over_first
 from tests.support.domains import Domain
 from tests.support.processes import Started
 from tests.support.ros2_launch import Ros2Launch, needs_ros2_launch
@@ -194,6 +195,30 @@ def test_actions_wait_for_the_tree_and_a_required_end_is_an_event(
     assert "up exited: 1" in launch.output
     assert "robot ended: 1 needed" in launch.output
     assert all(map(gone, below))
+
+
+def test_a_guard_alone_watches_nodes_that_keep_their_launch_file_and_one_hands_its_edge_over(
+    ros2_launch: Ros2Launch, domain: Domain
+) -> None:
+    folder = ros2_launch.folder
+    file = ros2_launch.write("bringup.launch.xml", PUBLISHERS)
+    adopt = (*HERE, "adopt", file.name, "-o", "robot.yaml")
+    processes.run(adopt, cwd=folder, check=True)
+    exact = ("--tolerance", "0.000001mm,0.0000001deg", "--for", "3")
+    verify = (*HERE, "verify", "robot.yaml", *exact)
+    for action in ("tfcompose_guard", "tfcompose"):
+        text = file.read_text("utf-8")
+        ros2_launch.write(
+            "all.launch.xml",
+            text.replace("</launch>", f'<{action} file="$(dirname)/robot.yaml"/></launch>'),
+        )
+        launch = ros2_launch("all.launch.xml")
+        launch.until_says(COMPLETE)
+        verified = processes.run(verify, cwd=folder, env=domain.environment)
+        assert verified.returncode == 0, verified.stdout + verified.stderr
+        assert end(launch) == 0
+        assert launch.output.count("static_transform_publisher") > 0
+        hand_over_first(folder, "robot.yaml", file.name)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])

@@ -106,6 +106,19 @@ def _share(plan: Plan, host: str | None) -> Plan:
     return replace(plan, edges=edges, processes=processes, guard=guard, host=host or "")
 
 
+def with_guard_alone(plan: Plan) -> Plan:
+    """Return the plan of a robot that others start: each process but the guard is external.
+
+    A guard cannot hold back what others start, so that a strict one watches.
+    """
+    processes = tuple(
+        process if process.kind in {"external", "guard"} else _elsewhere(process)
+        for process in plan.processes
+    )
+    mode = "watch" if plan.guard.mode == "strict" else plan.guard.mode
+    return replace(plan, processes=processes, guard=replace(plan.guard, mode=mode))
+
+
 def _edge_on_host(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:
     """Return the edge as it is seen on a host.
 

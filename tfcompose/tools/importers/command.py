@@ -112,7 +112,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.cli.reading import quote
     from tfcompose.foundation.findings import RejectedError
 
-    _check_use(arguments)
+    check_use(arguments)
     quote(arguments.file)
     try:
         if arguments.live or arguments.bag:
@@ -170,18 +170,18 @@ def _import_bringup(arguments: Namespace) -> int:
     elif kit := _kit(arguments.file):
         _add_kits(draft, kit, arguments)
     elif arguments.file.endswith(_LAUNCH):
-        _add_launch(draft, arguments, arguments.file)
+        add_launch_file(draft, arguments, arguments.file)
     elif arguments.file == STDIN and (ending := _ending_of(text := _with_root(read_text(STDIN)))):
         with TemporaryDirectory() as folder:  # nothing else is there to be read
             file = Path(folder, f"stdin{ending}")
             file.write_text(text, encoding="utf-8")
-            _add_launch(draft, arguments, str(file), "<stdin>")
+            add_launch_file(draft, arguments, str(file), "<stdin>")
     else:
         _refuse_more(arguments)
         _refuse_given(arguments)
         shown = arguments.file if arguments.file != STDIN else "<stdin>"
         add_script(draft, read_text(arguments.file), shown, _target(arguments))
-    return _finish(draft, arguments)
+    return finish(draft, arguments)
 
 
 def _refuse_more(arguments: Namespace) -> None:
@@ -245,7 +245,14 @@ def _add_vehicles(draft: ImportDraft, arguments: Namespace) -> None:
 
 
 def _import_observed(arguments: Namespace) -> int:
-    """Import what is published, or was recorded."""
+    return finish(observed_draft(arguments), arguments)
+
+
+def observed_draft(arguments: Namespace, *, is_adopted: bool = False) -> ImportDraft:
+    """Return a draft of what is published, or was recorded.
+
+    With ``is_adopted`` fixed edges of stock nodes stay with those.
+    """
     from tfcompose.cli.compiling import library
     from tfcompose.cli.live import observed
     from tfcompose.model.plan.topics import topics_below
@@ -265,11 +272,13 @@ def _import_observed(arguments: Namespace) -> int:
     draft = ImportDraft(arguments.robot or robot_name(name), [head])
     if arguments.namespace:
         draft.sections["ros"] |= {"namespace": arguments.namespace, "isolate": "topics"}
-    tree = Observed(draft, observer.publishers.where, words_of, arguments.namespace)
+    tree = Observed(
+        draft, observer.publishers.where, words_of, arguments.namespace, is_adopted=is_adopted
+    )
     tree.add(observer.edges(observer.until_ns))
     if not arguments.no_sensors:
         tree.recognise(library())
-    return _finish(draft, arguments)
+    return draft
 
 
 def _with_root(text: str) -> str:
@@ -297,7 +306,8 @@ def _ending_of(text: str) -> str:
     )
 
 
-def _add_launch(draft: ImportDraft, arguments: Namespace, file: str, shown: str = "") -> None:
+def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: str = "") -> None:
+    """Add what a launch file starts, and the descriptions of its state publishers."""
     from tfcompose.cli.compiling import library, print_output, report_missing_confinement
     from tfcompose.cli.reading import read_text
     from tfcompose.tools.importers.launch import add_launch
@@ -326,7 +336,7 @@ def _add_launch(draft: ImportDraft, arguments: Namespace, file: str, shown: str 
     add_descriptions(draft, descriptions, Workshop(known, target, presets, folders))
 
 
-def _finish(draft: ImportDraft, arguments: Namespace) -> int:
+def finish(draft: ImportDraft, arguments: Namespace) -> int:
     """Write a draft, with what ``lint`` finds in it; return the exit code."""
     from dataclasses import replace
 
@@ -389,7 +399,7 @@ def _known_packages(packages: dict[str, str], arguments: Namespace) -> Packages:
     return Packages(_disk(packages.values(), arguments), named, advice=advice)
 
 
-def _check_use(arguments: Namespace) -> None:
+def check_use(arguments: Namespace) -> None:
     """Refuse names that cannot be, and a file that is there.
 
     Raises:

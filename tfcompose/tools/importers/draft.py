@@ -89,6 +89,10 @@ class ImportDraft:
     used: set[str] = field(default_factory=set)
     #: Each process with its use_sim_time, None where the source does not set it, and its place.
     clocks: list[tuple[str, Any, Span | None]] = field(default_factory=list)
+    #: Whether the robot keeps its launch files: each process is external.
+    is_adopted: bool = False
+    #: Where a launch file starts publishers: of a fixed edge, by its child, and of a part.
+    publishers: dict[str, Span | None] = field(default_factory=dict)
 
     def note(self, at: Entry, *texts: str) -> None:
         """Put comments above an entry, each once."""

@@ -447,7 +447,7 @@ class _LaunchImport:
         own = {
             key: params[key] for key in ("publish_frequency", "ignore_timestamp") if key in params
         }
-        if own:
+        if own and not self.draft.is_adopted:
             joints.setdefault("params", {}).update(own)
             self.draft.note(
                 ("processes", "joints"), where(span, "what robot_state_publisher is told")

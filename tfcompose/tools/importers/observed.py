@@ -53,6 +53,8 @@ class Observed:
     where: Callable[[bytes | None], str]
     words_of: Callable[[int], Sequence[str]]
     namespace: str = ""
+    #: Whether the robot keeps its nodes: fixed edges of stock ones stay with those.
+    is_adopted: bool = False
     _owners: dict[str, str] = field(default_factory=dict)
     _poses: dict[str, Pose] = field(default_factory=dict)
 
@@ -87,6 +89,8 @@ class Observed:
     def _is_own(self, edge: EdgeState) -> bool:
         """Return whether tfcompose's static publisher or a stock node sends the edge."""
         below = f"/{self.namespace}/" if self.namespace else "/"
+        if self.is_adopted:
+            return edge.nodes == (below + STATIC,)
         return len(edge.nodes) == 1 and edge.nodes[0] in {below + STATIC, below + STATE_PUBLISHER}
 
     def recognise(self, library: Library) -> None:

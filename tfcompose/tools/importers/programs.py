@@ -60,7 +60,7 @@ def add_program(draft: ImportDraft, program: Program, target: Target) -> str | N
     if program.executable == PROGRAM:
         _add_transform(draft, program)
         return None
-    if program.executable in JOINT_PUBLISHERS:
+    if program.executable in JOINT_PUBLISHERS and not draft.is_adopted:
         return _add_joint_publisher(draft, program)
     return _add_process(draft, program, target)
 
@@ -77,8 +77,12 @@ def _add_transform(draft: ImportDraft, program: Program) -> None:
         )
         return
     notes = [where(at, transform.order)]
-    added = draft.frame(transform.parent, transform.child, transform.keys(), at, *notes)
+    keys = transform.keys()
     entry = ("frames", transform.child)
+    draft.publishers.setdefault(transform.child, at)
+    if draft.is_adopted and transform.child not in draft.sections["frames"]:
+        keys |= {"owner": _add_external(draft, program), "static": True}
+    added = draft.frame(transform.parent, transform.child, keys, at, *notes)
     if added and not isolated(draft, moved, program.namespace):
         remaps = ", ".join(f"{old} → {new}" for old, new in moved.items())
         draft.todo(
@@ -89,6 +93,21 @@ def _add_transform(draft: ImportDraft, program: Program) -> None:
         )
     for message in program.todo:
         draft.todo(message, at, entry)
+
+
+def _add_external(draft: ImportDraft, program: Program) -> str:
+    """Add the process of a publisher that goes on to be started elsewhere; return its name."""
+    namespace = (program.namespace or "").strip("/")
+    if program.name is None:
+        draft.todo(
+            f"{PROGRAM} has another node name at each start",
+            program.at,
+            advice="name its node in the launch file, or hand its edge over first",
+        )
+    node = "/".join(("", *filter(None, (namespace, program.name or PROGRAM))))
+    name = draft.free_name(program.name or PROGRAM)
+    keys = {"external": True} | ({} if node == f"/{name}" else {"node": node})
+    return draft.process(name, keys, where(program.at))
 
 
 def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:

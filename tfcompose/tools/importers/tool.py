@@ -12,6 +12,12 @@ TOOL = Tool(
             "tfcompose.tools.importers.command",
             group="Write",
         ),
+        Command(
+            "adopt",
+            "Guard a robot that keeps its launch files, and take its fixed edges one by one",
+            "tfcompose.tools.importers.adopt",
+            group="Write",
+        ),
     ),
     codes=__package__,
 )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from tfcompose.compiler.urdf.lint import read_urdf
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.model.plan.stock import STATE_PUBLISHER
 from tfcompose.tools.importers.draft import path_from, where
 from tfcompose.tools.importers.launch_records import PACKAGE
 from tfcompose.tools.importers.robot_file import imported, put_into
@@ -44,7 +45,9 @@ def add_descriptions(
     Of several URDFs the first becomes links, and each other is named.
     """
     for described in descriptions:
-        if described.file and not described.file.endswith(".urdf"):
+        if draft.is_adopted:
+            _add_external_part(draft, described, workshop)
+        elif described.file and not described.file.endswith(".urdf"):
             _add_part(draft, described, workshop)
         elif draft.sections["links"]:
             draft.todo(
@@ -54,6 +57,26 @@ def add_descriptions(
             )
         else:
             _add_links(draft, described, workshop)
+
+
+def _add_external_part(draft: ImportDraft, described: Description, workshop: Workshop) -> None:
+    """Add a description as a part whose edges a robot_state_publisher goes on to publish."""
+    if described.file.endswith(".xacro"):
+        _add_part(draft, described, workshop)
+        part = next(reversed(draft.sections["parts"]))
+    else:
+        part = draft.robot
+        file = described.file or f"{draft.robot}.urdf"
+        if described.text:
+            draft.neighbours[file] = described.text
+        address = file if described.text else path_from(workshop.target, file)
+        prefix = {"prefix": described.prefix} if described.prefix else {}
+        draft.sections["parts"][part] = {"urdf": address, **prefix}
+        draft.note(("parts", part), where(described.at, "what robot_state_publisher is given"))
+        draft.has_unknown_frames = True
+    draft.publishers[part] = described.at
+    owner = draft.process(STATE_PUBLISHER, {"external": True}, where(described.at))
+    draft.sections["parts"][part]["owner"] = owner
 
 
 def _add_part(draft: ImportDraft, described: Description, workshop: Workshop) -> None:

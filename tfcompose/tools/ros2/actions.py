@@ -72,6 +72,9 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
     A robot that fails ends launch, with exit code 1.
     """
 
+    #: The command of tfcompose that the action runs.
+    command = "up"
+
     def __init__(  # noqa: PLR0913 (keywords)
         self,
         *,
@@ -84,7 +87,7 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
         **options: Any,
     ) -> None:
         name = LocalSubstitution("tfcompose_robot", description="the robot file's name")
-        super().__init__(cmd=[*HERE, "up"], name=name, prefix="", output=output, **options)
+        super().__init__(cmd=[*HERE, self.command], name=name, prefix="", output=output, **options)
         self._file = normalize_to_list_of_substitutions(file)
         self._profiles = [normalize_to_list_of_substitutions(profile) for profile in profiles]
         self._overlays = [normalize_to_list_of_substitutions(overlay) for overlay in overlays]
@@ -202,6 +205,17 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
         del context
         name, code = self.process_details["name"], self.return_code
         raise RobotFailedError(f"the robot of {name} ended with exit code {code}")
+
+
+@expose_action("tfcompose_guard")
+class TfComposeGuard(TfCompose):
+    """Guard the tree of a robot whose nodes this launch file starts itself.
+
+    Nothing but the guard is started, by ``tfcompose guard``; keywords and attributes are those of
+    ``TfCompose``.
+    """
+
+    command = "guard"
 
 
 class _EventPipe:

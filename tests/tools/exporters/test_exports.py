@@ -721,3 +721,17 @@ def test_a_container_is_the_unit_and_what_it_loads_is_none() -> None:
     ]
     assert "box" in services
     assert "a" not in services
+
+
+def test_a_launch_file_starts_no_publisher_without_an_edge() -> None:
+    robot = """
+tfcompose: 1
+robot: rover
+frames: {odom: {}, base_link: {parent: odom, owner: drive}}
+processes: {drive: {run: {package: demo, executable: drive}}}
+"""
+    files = built(robot)
+    plan = read_plan(files["plan.json"], "plan.json")
+    (file,), gaps = launch(plan, Machine(".."), files["robot.state_publisher.urdf"])
+    assert "static" not in file.text
+    assert any("static" in gap for gap in gaps)

@@ -111,12 +111,12 @@ def with_guard_alone(plan: Plan) -> Plan:
 
     A guard cannot hold back what others start, so that a strict one watches.
     """
-    processes = tuple(
-        process if process.kind in {"external", "guard"} else _elsewhere(process)
-        for process in plan.processes
-    )
+    processes = list(plan.processes)
+    for index, process in enumerate(processes):
+        if process.kind not in {"external", "guard"}:
+            processes[index] = _elsewhere(process)
     mode = "watch" if plan.guard.mode == "strict" else plan.guard.mode
-    return replace(plan, processes=processes, guard=replace(plan.guard, mode=mode))
+    return replace(plan, processes=tuple(processes), guard=replace(plan.guard, mode=mode))
 
 
 def _edge_on_host(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:

@@ -293,7 +293,9 @@ class _Export:
             if process.kind == "guard":
                 self.gaps.append("the guard is left out: it belongs to tfcompose up")
                 continue
-            if process.kind in OWN_KINDS and stock is not None:
+            if process.kind in OWN_KINDS and (stock is not None or not process.owns):
+                if stock is None:
+                    self.gaps.append(f"{process.name} is left out: it publishes no edge")
                 continue
             before = self._before(process)
             self._waits(process, before[:1])

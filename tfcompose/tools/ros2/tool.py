@@ -5,5 +5,12 @@ from tfcompose.foundation.tool import Tool, Topic
 TOOL = Tool(
     name="ros2",
     package=__package__,
-    topics=(Topic("ros2", "colcon, `ros2 tfcompose`, and launch files", group="Integration"),),
+    topics=(
+        Topic("ros2", "colcon, `ros2 tfcompose`, and launch files", group="Integration"),
+        Topic(
+            "nodes",
+            "in ROS's words: topics, QoS, lifecycle, diagnostics and REPs",
+            group="Integration",
+        ),
+    ),
 )

@@ -1,4 +1,4 @@
-"""Edges as they were seen: a table for people, an object for programs."""
+"""Observed edges as a table, or as JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.chain import FrameChain
     from tfcompose.tf.live.edges import EdgeState, TreeObserver
 
-#: A stamp that is farther off is taken to be of another clock.
+#: A stamp with a larger difference counts as one of another clock.
 _CLOCKS_AGREE_S = 1e6
 HEADS = ("edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay", "")
 #: A narrow terminal goes without kind (a row of a fixed edge has no numbers), jitter, gap, delay
@@ -69,7 +69,7 @@ def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) ->
 
 
 def not_kept(observer: TreeObserver) -> str:
-    """Return in words how many transforms came of edges that are not kept, and from whom."""
+    """Return the number and publishers of transforms beyond the bounds, as text."""
     nodes = {
         node for gid in observer.beyond for node in observer.publishers.nodes(gid, static=False)
     }
@@ -110,7 +110,7 @@ def _row(state: EdgeState, contested: set[str]) -> tuple[str, ...]:
 
 
 def duration(seconds: float | None) -> str:
-    """Return milliseconds or seconds, with as many digits as matter."""
+    """Return milliseconds or seconds, with the significant digits."""
     if seconds is None:
         return "–"
     if abs(seconds) > _CLOCKS_AGREE_S:
@@ -119,9 +119,9 @@ def duration(seconds: float | None) -> str:
 
 
 def chain_line(chain: FrameChain | str, a: str, b: str) -> str:
-    """Return the number of edges between two frames and the newest pose's age.
+    """Return the number of edges between two frames and the age of the newest pose.
 
-    Or why there is no chain.
+    Without a chain, return the reason.
     """
     ends = f"{printable(a)} → {printable(b)}"
     if isinstance(chain, str):

@@ -32,7 +32,7 @@ def inertia_missing(robot: Robot) -> Iterator[Finding]:
     for edge in moving if other else ():
         if not _has_one(masses, fixed, edge.child):
             at = robot.links[edge.child].at
-            message = f"{edge.child}, moved by {edge.joint_name}, has no mass, but {other} has"
+            message = f"{edge.child}, moved by {edge.joint_name}, has no mass; {other} has one"
             advice = '<inertial> with <mass value="…"/> and <inertia …/>'
             if not robot.is_foreign(at):
                 link = robot.links[edge.child]

@@ -326,7 +326,7 @@ def unreadable(state: TreeState) -> Iterator[Finding]:
             "TF832",
             message,
             None,
-            help="does it send bytes of its own making, or with another definition?",
+            help="does it build messages by hand, or use another definition of the type?",
         )
 
 

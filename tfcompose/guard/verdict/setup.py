@@ -64,7 +64,7 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
         )
     elif state.nodes:
         advice = (
-            "start robot_state_publisher, or tfcompose up; tfcompose doctor --for 20 looks longer"
+            "start robot_state_publisher or tfcompose up; tfcompose doctor --for 20 listens longer"
         )
     else:
         advice = (

@@ -82,7 +82,7 @@ def other_clock(stamp_ns: int, received_ns: int, sim_ns: int | None, *, simulate
     if near_sim:
         return f"stamped with simulated time ({stamp_ns / 1e9:.1f} s), unlike others"
     if stamp_ns < _NO_DATE_NS:
-        since = "simulated time, or time since a start"
+        since = "simulated time, or the time since a start"
         if _is_since_boot(stamp_ns, received_ns):
             since = "the time since this machine was started"
         return f"stamped {stamp_ns / 1e9:.1f} s, which is {since}"

@@ -1,8 +1,6 @@
 """tf2_ros's ``TransformBroadcaster`` and ``StaticTransformBroadcaster``.
 
-Send transforms on /tf and /tf_static.
-
-They need rclpy, and no tf2_msgs.
+They send transforms on /tf and /tf_static, and need rclpy but not tf2_msgs.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ class TransformBroadcaster:
     def __init__(self, node: Any, qos: Any = None) -> None:
         from tfcompose.tf.ros.node import TFPublisher  # noqa: PLC0415 (whoever has a node has ROS)
 
-        #: rclpy's publisher; what it publishes are bytes.
+        #: rclpy's publisher, for bytes.
         self.pub_tf = TFPublisher(node, static=False, qos=qos).publisher
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802 (tf2_ros's name)
@@ -38,7 +36,7 @@ class TransformBroadcaster:
 class StaticTransformBroadcaster:
     """Sends transforms of fixed edges, latched.
 
-    Each message has all that were sent so far, so that none gets lost.
+    Each message has all transforms so far, because a latched topic keeps only the last message.
 
     As in tf2_ros's Python, the first transform of a child frame stays; one with another parent or
     pose is not sent, and the node's log says so.
@@ -52,7 +50,7 @@ class StaticTransformBroadcaster:
     def __init__(self, node: Any, qos: Any = None) -> None:
         from tfcompose.tf.ros.node import TFPublisher  # noqa: PLC0415 (whoever has a node has ROS)
 
-        #: rclpy's publisher; what it publishes are bytes.
+        #: rclpy's publisher, for bytes.
         self.pub_tf = TFPublisher(node, static=True, qos=qos).publisher
         self._node = node
         self._sent: dict[str, SentTransform] = {}

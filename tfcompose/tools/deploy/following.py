@@ -13,12 +13,14 @@ if TYPE_CHECKING:
 
 
 def can_follow(before: Plan, after: Plan) -> bool:
-    """Return whether the robot can go on while hosts change plans one after another.
+    """Return whether the robot can keep running while hosts change plans one after another.
 
-    It cannot where processes or edges move between hosts, because all have to end first; where
-    frames vanish, because buffers of nodes that go on would keep them; where settings of all nodes
-    change; and where a guard does more than report, because it would judge by one plan what
-    another host does by the other.
+    It cannot in these cases:
+
+    - Processes or edges move between hosts: the old ones must end first.
+    - Frames vanish: buffers of running nodes would keep them.
+    - Settings of all nodes change.
+    - A guard does more than report: it would act by one plan on a host that runs the other.
     """
     if (before.robot, before.ros, before.guard) != (after.robot, after.ros, after.guard):
         return False
@@ -36,15 +38,15 @@ def _hosts(plan: Plan) -> dict[str, str | None]:
 
 
 def _places(plan: Plan) -> dict[str, str | None]:
-    """Return on which host each frame gets its parent."""
+    """Return the host that publishes each frame's parent edge."""
     hosts = _hosts(plan)
     return {edge.child: hosts.get(edge.owner) for edge in plan.edges}
 
 
 def same_files(before: Mapping[str, str], after: Mapping[str, str]) -> bool:
-    """Return whether two releases, by their manifests, differ only in what is built.
+    """Return whether two releases, by their manifests, differ only in built files.
 
-    Others' readers are unknown.
+    The readers of other files are unknown.
     """
     kinds = (f"{NAMED}/", f"{WHEELS}/")
     named = [

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-#: No line is longer, unless a single word is.
+#: The longest line, except for a longer single word.
 _WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True)
 class CodeBlock:
-    """An expression in brackets: what is before its parts, the parts, and what is behind them."""
+    """An expression in brackets: the text before its parts, the parts, and the text after them."""
 
     begin: str
     parts: tuple[CodeBlock | str, ...]
@@ -24,10 +24,7 @@ class CodeBlock:
         return f"{self.begin}{', '.join(map(str, self.parts))}{self.end}"
 
     def lines(self, indent: str = "", end: str = "") -> Iterator[str]:
-        """Yield it in lines, in one if that is short enough.
-
-        Each part on a line of its own otherwise.
-        """
+        """Yield one line if it is short enough, else one line for each part."""
         if len(indent) + len(str(self)) + len(end) <= _WIDTH:
             yield f"{indent}{self}{end}"
             return

@@ -1,4 +1,4 @@
-"""Texts, parameters and conditions of launch's objects, with arguments that stand for themselves.
+"""Convert texts, parameters and conditions of launch, and keep launch arguments in them.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 
 
 def text_of(value: Any, context: RecordingContext) -> str:
-    """Return the text of a value, a substitution or a list of them, as launch has it.
+    """Return the text of a value, a substitution or a list of them, as launch evaluates it.
 
     Raises:
         FailedError: if it cannot be evaluated.
@@ -67,10 +67,10 @@ def text_of(value: Any, context: RecordingContext) -> str:
 
 
 def evaluated(evaluate: Callable[[Any], Any], context: RecordingContext) -> Any:
-    """Return what launch, or another package, makes of a context.
+    """Evaluate something of launch, or of another package, in a context.
 
     Raises:
-        FailedError: with what it says, if it raises something.
+        FailedError: with the message of any exception.
     """
     try:
         return evaluate(context)
@@ -81,12 +81,12 @@ def evaluated(evaluate: Callable[[Any], Any], context: RecordingContext) -> Any:
 
 
 def optional_text(value: Any, context: RecordingContext) -> str | None:
-    """Return the text of a value, or None where there is none."""
+    """Return the text of a value, or None."""
     return None if value is None else text_of(value, context)
 
 
 def kept_text(value: Any, context: RecordingContext, *, typed: bool = False) -> str:
-    """Return a value's text in which launch arguments stand for themselves.
+    """Return a value's text, with launch arguments as references.
 
     ``typed``: where an argument is all of it, it may be 10.0, which texts lose.
     """
@@ -121,7 +121,7 @@ def _joined(paths: Iterable[list[Part]]) -> list[Part]:
 
 
 def is_true(value: Any, context: RecordingContext) -> bool:
-    """Return what launch takes for true or false.
+    """Return whether launch reads the text as true or false.
 
     Raises:
         FailedError: for another text.
@@ -137,7 +137,7 @@ def is_true(value: Any, context: RecordingContext) -> bool:
 
 
 def describe(value: Any) -> str:
-    """Return a value that may have substitutions in it, for people."""
+    """Return a value with its substitutions, for display."""
     if isinstance(value, (list, tuple)):
         return " ".join(map(describe, value))
     if not isinstance(value, launch.Substitution):
@@ -165,7 +165,7 @@ def _describe_equality(arguments: Mapping[str, Any], sign: str) -> str:
     return f"{left} {sign} {right}"
 
 
-#: What substitutions are for people, by their classes.
+#: Display texts of substitutions by class.
 _DESCRIBED: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "TextSubstitution": lambda arguments: str(arguments["text"]),
     "LaunchConfiguration": lambda arguments: describe(arguments["variable_name"]),
@@ -192,7 +192,7 @@ _KINDS: dict[Any, str] = {bool: "bool", int: "int", float: "float", str: "string
 def parameters_of(declared: Any, context: RecordingContext, at: Any) -> list[Any]:
     """Return parameters as mappings and names of files, in order.
 
-    What cannot be resolved is said.
+    Values that cannot be resolved are reported.
     """
     read: list[Any] = []
     for params in declared or ():
@@ -210,10 +210,10 @@ def parameters_of(declared: Any, context: RecordingContext, at: Any) -> list[Any
 
 
 def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
-    """Return the name of a parameter file, or of what launch makes of it by its substitutions.
+    """Return the path of a parameter file, or of the file that launch writes after substitutions.
 
     Raises:
-        FailedError: if it has some that cannot be resolved, or cannot be read.
+        FailedError: if a substitution cannot be resolved, or the file cannot be read.
     """
     is_described = isinstance(params, ParameterFile)
     arguments = arguments_of(params) if is_described else {"param_file": params}
@@ -228,10 +228,10 @@ def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
 
 
 def made_file(file: str, source: str, text: str, at: Any, context: RecordingContext) -> str:
-    """Return the path that stands for what launch makes of a file's text.
+    """Return a placeholder path for the file that launch writes after substitutions.
 
     Raises:
-        FailedError: if it holds what a command makes of a file.
+        FailedError: if it contains the output of a command.
     """
     if files_in(with_files(text)):
         raise FailedError(f"{relative(file)} takes what a command makes of a file")
@@ -257,12 +257,12 @@ def _flat(
 
 
 def parameter_value(value: Any, context: RecordingContext) -> Any:
-    """Return a parameter's value as launch hands it on.
+    """Return a parameter's value as launch passes it to the node.
 
-    What a substitution gives is read as YAML.
+    The result of a substitution is read as YAML.
 
     Raises:
-        FailedError: if launch would refuse it.
+        FailedError: if launch would reject it.
     """
     if isinstance(value, ParameterValue):
         return _described(arguments_of(value), context)
@@ -284,7 +284,7 @@ def parameter_value(value: Any, context: RecordingContext) -> Any:
 
 
 def _described(made_of: Mapping[str, Any], context: RecordingContext) -> Any:
-    """Return the value of what launch calls a description of one, with its type."""
+    """Return the value of launch's ``ParameterValue``, with its type."""
     value, value_type = made_of["value"], made_of.get("value_type")
     if isinstance(value, (int, float)) and value_type in (None, type(value)):
         return value
@@ -314,7 +314,7 @@ def _typed_by_launch(value: Any, value_type: Any, context: RecordingContext) -> 
 
 
 def _kept_with_type(value: Any, value_type: Any, context: RecordingContext) -> str | None:
-    """Return the text with arguments as themselves, if they have the value's type."""
+    """Return the text with arguments as references, if they have the value's type."""
     text = _parameter_text(value, context)
     argument = argument_of(text)
     if argument and context.declared.get(argument.name) == _KINDS.get(value_type):
@@ -334,9 +334,9 @@ def _parameter_text(value: Any, context: RecordingContext) -> str:
 
 
 def _read_as_yaml(value: Any, context: RecordingContext) -> Any:
-    """Return the value that YAML reads in a text.
+    """Return the value of a text read as YAML.
 
-    Arguments stand for themselves where they are read alike.
+    Arguments remain references if their value reads the same.
     """
     text = _parameter_text(value, context)
     if files_in(text):
@@ -364,7 +364,7 @@ def _typed(text: str) -> Any:
 
 
 def when_of(condition: Any, context: RecordingContext) -> str | None:
-    """Return a condition as an expression of a robot file, or None where it cannot be one."""
+    """Return a condition as an expression of a robot file, or None if that is impossible."""
     arguments = arguments_of(condition)
     if isinstance(condition, IfCondition):
         inner = expression_of(arguments["predicate_expression"], context)
@@ -377,7 +377,7 @@ def when_of(condition: Any, context: RecordingContext) -> str | None:
 
 
 def describe_condition(condition: Any) -> str:
-    """Return a condition for people."""
+    """Return a condition for display."""
     arguments = arguments_of(condition)
     if isinstance(condition, UnlessCondition):
         return f"not {describe(arguments['predicate_expression'])}"
@@ -452,7 +452,7 @@ def _of_python_expression(value: PythonExpression, context: RecordingContext) ->
 
 
 class _PythonText:
-    """The text of a Python condition, in which names stand for arguments."""
+    """The text of a Python condition, with names in place of arguments."""
 
     def __init__(self, context: RecordingContext) -> None:
         self._context = context
@@ -469,7 +469,7 @@ class _PythonText:
         self._text += stands_for
 
     def expression(self) -> str | None:
-        """Return the condition in the robot file's words, or None where it has none for it."""
+        """Return the condition as an expression of a robot file, or None if that is impossible."""
         try:
             return self._of(ast.parse(self._text.strip(), mode="eval").body)
         except (SyntaxError, ValueError):

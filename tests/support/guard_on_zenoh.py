@@ -9,6 +9,8 @@ import os
 import sys
 from pathlib import Path
 
+from tests.support.launcher import EXECUTES
+
 #: Read by each Python that starts.
 _SITE = """
 import sys
@@ -48,7 +50,7 @@ def guard_on_zenoh(folder: Path, router: str) -> dict[str, str]:
     """Return what makes guards read Zenoh that are started with it in their environment."""
     site = folder / "site"
     site.mkdir()
-    (site / "sitecustomize.py").write_text(_SITE, encoding="utf-8")
+    (site / "sitecustomize.py").write_text(EXECUTES + _SITE, encoding="utf-8")
     override = f'mode="peer";connect/endpoints=["{router}"]'
     return {
         "PYTHONPATH": os.pathsep.join([str(site), *filter(None, sys.path)]),

@@ -4,6 +4,8 @@ import os
 import sys
 from pathlib import Path
 
+from tests.support.launcher import EXECUTES
+
 #: Read by each Python that starts.
 _SITE = """
 import sys
@@ -26,5 +28,5 @@ def guard_without_ids(folder: Path) -> dict[str, str]:
     """Return what makes guards nameless that are started with it in their environment."""
     site = folder / "site"
     site.mkdir()
-    (site / "sitecustomize.py").write_text(_SITE, encoding="utf-8")
+    (site / "sitecustomize.py").write_text(EXECUTES + _SITE, encoding="utf-8")
     return {"PYTHONPATH": os.pathsep.join([str(site), *filter(None, sys.path)])}

@@ -32,6 +32,14 @@ plan = read_plan(file.read_text(), str(file))
 sys.exit(supervise(plan, file, report=lambda notice: print(notice, flush=True)))
 """
 
+#: In a sitecustomize: ``up`` executes its processes, so that each of them reads that too.
+EXECUTES = """
+import sys
+if "up" in sys.orig_argv:
+    from tfcompose.launcher.forking import Forker
+    Forker.can_start = lambda *_: False
+"""
+
 
 def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
     return PlanProcess(name, more.pop("kind", "run"), argv=(*PYTHON, code, *words), **more)

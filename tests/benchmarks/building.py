@@ -39,10 +39,10 @@ class Robot:
 
 
 def contenders(robots: Sequence[Robot]) -> dict[Contender, Opened]:
-    """Return what builds these robots, smallest first; a trial leaves out the last.
+    """Return what builds these robots.
 
-    tfcompose also has the rows ``growth``, from the first robot to the last, and ``memory`` in MB,
-    for the last.
+    If the last has more links than the first, a trial leaves it out, and tfcompose also has the
+    rows ``growth``, from the first to the last, and ``memory`` in MB, for the last.
     """
 
     @contextmanager
@@ -57,7 +57,7 @@ def contenders(robots: Sequence[Robot]) -> dict[Contender, Opened]:
             for robot in _chosen(robots, workspace):
                 build = ("build", f"{robot.row}.yaml", "-o", f"out_{robot.row}")
                 values[robot.row], megabytes = usage(workspace, "-c", TFCOMPOSE_CODE, *build)
-            if not workspace.is_quick:
+            if not workspace.is_quick and _grows(robots):
                 values["growth"] = values[robots[-1].row] / values[robots[0].row]
                 values["memory"] = megabytes
             return values
@@ -86,4 +86,8 @@ def contenders(robots: Sequence[Robot]) -> dict[Contender, Opened]:
 
 
 def _chosen(robots: Sequence[Robot], workspace: Workspace) -> Sequence[Robot]:
-    return robots[:-1] if workspace.is_quick else robots
+    return robots[:-1] if workspace.is_quick and _grows(robots) else robots
+
+
+def _grows(robots: Sequence[Robot]) -> bool:
+    return robots[-1].links > robots[0].links

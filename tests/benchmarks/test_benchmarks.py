@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from tests.benchmarks import record
+from tests.benchmarks import pages, record
 from tests.benchmarks.__main__ import FailedError, measured, over_limits
 from tests.benchmarks.benchmark import TFCOMPOSE, Benchmark, Contender, Limit, Opened, Row, measure
 from tests.benchmarks.plots import plot
@@ -198,6 +198,14 @@ def test_a_result_survives_the_file_and_others_are_kept(tmp_path: Path) -> None:
     assert '"peer": [2.0, 2.0, 2.0]' in file.read_text("utf-8")
     assert result().versions == {"peer": "1.2"}
     assert result().missing == {"absent": "not installed: pip install absent"}
+
+
+@pytest.mark.parametrize("rest", ["", "\n## More\n"])
+def test_a_page_gets_the_table_of_what_is_recorded(rest: str) -> None:
+    mark, rows = "<!-- figures: trial other -->\n\n", table([result()])
+    assert pages.with_tables(f"{mark}| old |\n{rest}", {"trial": result()}) == mark + rows + rest
+    assert pages.with_tables(mark + rest[1:], {"trial": result()}) == mark + rows + rest
+    assert pages.with_tables(mark + rest[1:], {}) == mark + rest[1:]
 
 
 def test_plots_are_png_and_svg_and_the_same_each_time(tmp_path: Path) -> None:

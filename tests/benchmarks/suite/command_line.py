@@ -51,7 +51,7 @@ BENCHMARK = Benchmark(
         "lint": Row(
             "`lint` of `autonomous_robot.yaml`", "ms", (Limit(3.5, "least", times=MODEL),)
         ),
-        "help": Row("`--help`", "ms", (Limit(2.5, "least", times=NOTHING),)),
+        "help": Row("`--help`", "ms", (Limit(3.5, "least", times=NOTHING),)),
     },
     contenders={contender: opened(contender) for contender in COMMANDS},
     runs=21,

@@ -12,6 +12,7 @@ from tests.benchmarks.contenders import TFCOMPOSE_ON_ROS
 from tests.benchmarks.fixed_robot import COMMANDS, EDGES, listening
 from tests.benchmarks.measures import cpu_s, pss_mb, tree
 from tests.benchmarks.record import ROOT
+from tests.support.waiting import until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -39,14 +40,29 @@ def opened(command_of: Callable[[Workspace], list[str]], *, has_tutorial: bool) 
                 memory, core = _idle(process.pid, workspace)
             values = {"memory": memory, "core": core}
             if has_tutorial:
-                with workspace.running(sys.executable, "-m", "tfcompose", *TUTORIAL) as process:
-                    memory, core = _idle(process.pid, workspace)
+                with _tutorial(workspace) as pid:
+                    memory, core = _idle(pid, workspace)
                 values |= {"tutorial_memory": memory, "tutorial_core": core}
             return values
 
         yield sample
 
     return robot
+
+
+@contextmanager
+def _tutorial(workspace: Workspace) -> Iterator[int]:
+    """Run the tutorial robot; yield the launcher's process number when its tree is complete.
+
+    Raises:
+        RuntimeError: if the tree is not complete in time.
+    """
+    output = workspace.folder / "output.txt"
+    argv = (sys.executable, "-m", "tfcompose", *TUTORIAL)
+    with output.open("wb") as out, workspace.running(*argv, stdout=out) as process:
+        if not until(lambda: "tree complete" in output.read_text("utf-8")):
+            raise RuntimeError("the tree is not complete")
+        yield process.pid
 
 
 def _idle(pid: int, workspace: Workspace) -> tuple[float, float]:

@@ -69,8 +69,11 @@ def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(
     simulated = "drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}"
     missing = "drive: {run: [no_drive], node: drive}\n  more: {run: [no_more]}"
     demo = f"demo: {{processes: {{{simulated}, more: {{run: ['true']}}}}}}"
-    text = f"{ROVER.replace(simulated, missing)}profiles: {{{demo}, idle: {{}}}}\n"
+    needs_more = "sim: {processes: {more: {run: [no_sim]}}}"
+    text = f"{ROVER.replace(simulated, missing)}profiles: {{{demo}, {needs_more}, idle: {{}}}}\n"
     (tmp_path / "robot.yaml").write_text(text)
+    errors = tfcompose("up", "robot.yaml", "-p", "sim", code=1).stderr
+    assert errors.endswith(": tfcompose up robot.yaml --profile demo\n")
     errors = tfcompose("up", "robot.yaml", code=1).stderr
     assert errors.count("error[TF810]") == 1
     assert all(name in errors.splitlines()[0] for name in ("no_drive of drive", "no_more of more"))

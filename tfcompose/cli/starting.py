@@ -239,37 +239,36 @@ def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
     profiles = _profiles_that_start(arguments)
     if not profiles:
         return found
-    options = "".join(f" --profile {name}" for name in arguments.profiles)
-    advice = (
-        f"to start without them: tfcompose up {arguments.file}{options} --profile"
-        f" {' or '.join(profiles)}"
-    )
+    advice = f"to start without them: tfcompose up {arguments.file} --profile {profiles}"
     return replace(found, help="; ".join(filter(None, (found.help, advice))))
 
 
-def _profiles_that_start(arguments: Namespace) -> list[str]:
-    """Return the profiles with which every program exists, added to those requested."""
+def _profiles_that_start(arguments: Namespace) -> str:
+    """Return the profiles with which every program exists, as ``a or b``; empty if there are none.
+
+    They replace those requested, or else come on top of them: ``sim --profile a``.
+    """
     from tfcompose.spec.language import profiles_in, with_includes
     from tfcompose.spec.load import load
 
     try:
         source = with_includes(load(read_text(arguments.file), arguments.file), read_text)
         names = [name for name in profiles_in(source) if name not in arguments.profiles]
-        return [name for name in names if _starts_with(name, arguments)]
+        for others in dict.fromkeys(((), tuple(arguments.profiles))):
+            fitting = [name for name in names if _starts_with([*others, name], arguments)]
+            if fitting:
+                return " --profile ".join([*others, " or ".join(fitting)])
     except RejectedError:
-        return []
+        pass
+    return ""
 
 
-def _starts_with(profile: str, arguments: Namespace) -> bool:
+def _starts_with(profiles: Sequence[str], arguments: Namespace) -> bool:
     from tfcompose.cli.compiling import inputs_of, library, overlays_of
     from tfcompose.compiler.compile import compile_robot
     from tfcompose.compiler.emit.plan import plan_of
 
-    profiles, overlays, given = (
-        [*arguments.profiles, profile],
-        overlays_of(arguments),
-        inputs_of(arguments),
-    )
+    overlays, given = overlays_of(arguments), inputs_of(arguments)
     file, presets = arguments.file, library()
     compiled = compile_robot(
         read_text(file), file, presets, profiles, overlays=overlays, read=read_text, given=given

@@ -225,6 +225,14 @@ def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_jud
     )
 
 
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_flood_begins_with_one_edge_more_than_the_bound(more: int) -> None:
+    running = History().clear()
+    rogue = running.joins("/rogue")
+    running.check().send(rogue, flood_of(MOST_UNDECLARED + more)).wait(1)
+    assert (rogue.gid in running.judge.ledger.flooders) == bool(more)
+
+
 def test_a_flood_is_reported_with_how_much_and_how_often() -> None:
     running = History().clear()
     rogue = running.joins("/rogue")

@@ -70,7 +70,7 @@ def test_a_mounts_xyz_has_the_forms_of_the_way() -> None:
     xyz = (0.2, 0.0, 0.3)
     source = load(MOUNT, "r.yaml")
     assert source.mapping("sensors", "c")["xyz"] == [0.2, 0, "30 cm"]
-    assert source.at(("sensors", "c", "xyz", 2)).line == MOUNT.count("\n")
+    assert source.span_of(("sensors", "c", "xyz", 2)).line == MOUNT.count("\n")
     validated = validate(source)
     assert validated.spec.sensors["c"].xyz == xyz
     draft, _ = resolve(validated, library())

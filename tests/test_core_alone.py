@@ -19,7 +19,7 @@ from tests.support.house import ROOT
 from tests.support.names import FILE, names
 from tests.support.preloaded import preloaded
 from tfcompose.foundation.catalogue import CATALOGUE
-from tfcompose.foundation.tool import shipped
+from tfcompose.foundation.tool import shipped_tools
 
 if TYPE_CHECKING:
     import subprocess
@@ -80,7 +80,7 @@ def alone(core: Path) -> Iterator[Run]:
 def test_help_topics_and_codes_are_those_of_the_core(alone: Run, tmp_path: Path) -> None:
     text = alone(tmp_path, "--help").stdout
     assert "  lint " in text
-    for tool in shipped().tools:
+    for tool in shipped_tools().tools:
         for command in tool.commands:
             assert f"  {command.name} " not in text
     for word in ("lint", "guard", "codes", "sensors"):
@@ -89,7 +89,7 @@ def test_help_topics_and_codes_are_those_of_the_core(alone: Run, tmp_path: Path)
     assert alone(tmp_path, "explain", "TF801").returncode == 0
 
 
-@pytest.mark.parametrize("tool", shipped().tools, ids=lambda tool: tool.name)
+@pytest.mark.parametrize("tool", shipped_tools().tools, ids=lambda tool: tool.name)
 def test_a_command_of_an_absent_tool_says_what_installs_it(
     tool: Tool, alone: Run, tmp_path: Path
 ) -> None:

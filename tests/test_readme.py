@@ -17,13 +17,13 @@ from tfcompose.cli.documentation import FOLDER, for_terminal, page, topic, topic
 from tfcompose.cli.parser import all_commands, parser_of
 from tfcompose.cli.terminal import plain
 from tfcompose.foundation.catalogue import CATALOGUE
-from tfcompose.foundation.tool import shipped
+from tfcompose.foundation.tool import shipped_tools
 from tfcompose.launcher.program import PROCESSES
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS, TOPICS = all_commands(), topics()
-FOLDERS = (FOLDER, *(tool.topic_folder for tool in shipped().tools))
+FOLDERS = (FOLDER, *(tool.topic_folder for tool in shipped_tools().tools))
 PAGES = {file.stem: file.read_text("utf-8") for folder in FOLDERS for file in folder.glob("*.md")}
 RECORD = record.read()
 EVERYTHING = "\n".join((README, *PAGES.values()))

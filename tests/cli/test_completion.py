@@ -158,9 +158,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (tmp_path / "my robot.yaml").write_text((ROBOTS / "rover.yaml").read_text("utf-8"), "utf-8")
     (tmp_path / "cell.yaml").write_text(CELL, "utf-8")
     plan = Plan("rover", "", None, RosSettings(), (), (PlanProcess("base_drive", "run"),))
-    place = runtime_dir_of(plan, os.environ)
-    lock = Lock(place)
-    plan_file = place.plan_folder("0") / "plan.json"
+    runtime_dir = runtime_dir_of(plan, os.environ)
+    lock = Lock(runtime_dir)
+    plan_file = runtime_dir.plan_folder("0") / "plan.json"
     plan_file.parent.mkdir()
     plan_file.write_text(write_plan(plan), "utf-8")
     yield tmp_path

@@ -40,7 +40,7 @@ ROBOTS = [text for text in EXAMPLES_OF_ROBOTS if "\nparts:" not in text]
 
 
 def lint(file: str, read: Callable[[str], str]) -> list[Finding]:
-    return list(compile_robot(read(file), file, PRESETS, read=read).found)
+    return list(compile_robot(read(file), file, PRESETS, read=read).findings)
 
 
 def fixed(folder: Path, text: str) -> str:
@@ -311,9 +311,9 @@ def slipped(draw: st.DrawFn) -> str:
     text = draw(st.sampled_from(ROBOTS))
     for _ in range(draw(st.integers(1, 4))):
         words = [
-            found
-            for found in re.finditer(r"[A-Za-z_]{2,}", text)
-            if text[found.end() : found.end() + 1] in ":,]}"
+            match
+            for match in re.finditer(r"[A-Za-z_]{2,}", text)
+            if text[match.end() : match.end() + 1] in ":,]}"
         ]
         begin, end = draw(st.sampled_from(words)).span()
         at, char = draw(st.integers(begin, end - 1)), draw(st.sampled_from("aexyz"))

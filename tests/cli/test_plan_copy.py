@@ -13,12 +13,12 @@ from tfcompose.launcher.runtime_dir import RuntimeDir, runtime_dir_of
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> RuntimeDir:
+def runtime_dir(tmp_path: Path) -> RuntimeDir:
     return runtime_dir_of(compiled_plan(ROVER), {"XDG_RUNTIME_DIR": str(tmp_path)})
 
 
 def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
-    place: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    runtime_dir: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, saved = compiled_plan(ROVER), Path.write_bytes
     removed: list[Path] = []
@@ -30,16 +30,16 @@ def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
         return saved(file, data)
 
     monkeypatch.setattr(Path, "write_bytes", late)
-    copy = copy_plan(plan, tmp_path / "plan.json", place, alone=False)
+    copy = copy_plan(plan, tmp_path / "plan.json", runtime_dir, alone=False)
     assert removed
     assert copy.read_text("utf-8")
 
 
 def test_a_copy_is_never_half_done_and_stays_while_its_plan_is_the_one(
-    place: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    runtime_dir: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, saved = compiled_plan(ROVER), Path.write_bytes
-    copy = copy_plan(plan, tmp_path / "plan.json", place, alone=False)
+    copy = copy_plan(plan, tmp_path / "plan.json", runtime_dir, alone=False)
     full = copy.read_bytes()
     observed: list[bytes] = []
 
@@ -50,14 +50,14 @@ def test_a_copy_is_never_half_done_and_stays_while_its_plan_is_the_one(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", slow)
-        assert copy_plan(plan, tmp_path / "plan.json", place, alone=True) == copy
+        assert copy_plan(plan, tmp_path / "plan.json", runtime_dir, alone=True) == copy
     assert observed == [full]
     assert [file.name for file in copy.parent.iterdir()] == ["plan.json"]
     assert (
         copy_plan(
             compiled_plan(ROVER.replace("lidar", "lamp")),
             tmp_path / "plan.json",
-            place,
+            runtime_dir,
             alone=True,
         )
         != copy

@@ -38,12 +38,12 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
 
         def run(robot: str, domain: int) -> RuntimeDir:
             plan = replace(PLAN, robot=robot, ros=RosSettings(domain_id=domain))
-            place = runtime_dir_of(plan, os.environ)
-            stack.callback(Lock(place).close)
-            folder = place.plan_folder("0")
+            runtime_dir = runtime_dir_of(plan, os.environ)
+            stack.callback(Lock(runtime_dir).close)
+            folder = runtime_dir.plan_folder("0")
             folder.mkdir()
             (folder / "plan.json").write_text(write_plan(plan), "utf-8")
-            return place
+            return runtime_dir
 
         yield run
 
@@ -93,14 +93,14 @@ def test_logs_are_those_of_the_newest_run_in_the_domain(
     runs: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     elsewhere = runs("crawler", 71)
-    for place, line in (
+    for runtime_dir, line in (
         (elsewhere, "far"),
         (replace_name(elsewhere, "rover@67", tmp_path), "near"),
     ):
-        place.folder.mkdir(exist_ok=True)
-        (place.folder / "lock").touch()
-        place.logs.mkdir(parents=True)
-        (place.logs / "drive.log").write_text(f"2026-01-01T00:00:00.000 {line}\n", "utf-8")
+        runtime_dir.folder.mkdir(exist_ok=True)
+        (runtime_dir.folder / "lock").touch()
+        runtime_dir.logs.mkdir(parents=True)
+        (runtime_dir.logs / "drive.log").write_text(f"2026-01-01T00:00:00.000 {line}\n", "utf-8")
     assert main(["logs"]) == 0
     out = capsys.readouterr().out
     assert "near" in out
@@ -118,9 +118,9 @@ def test_logs_are_those_of_the_newest_run_in_the_domain(
 def test_logs_begin_at_this_run_and_names_of_any_length_align(
     words: str, printed: list[str], runs: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    place = runs("rover", 67)
+    runtime_dir = runs("rover", 67)
     for run in ("first", "second", "third"):
-        logs = Logs(place.logs)
+        logs = Logs(runtime_dir.logs)
         for name in ("arm/driver_of_the_left_hand", "b"):
             assert logs.write(name, run) is None
         logs.close()
@@ -142,8 +142,10 @@ def test_a_run_that_is_not_there_is_refused(
     assert capsys.readouterr().out == ""
 
 
-def replace_name(place: RuntimeDir, name: str, tmp_path: Path) -> RuntimeDir:
-    return RuntimeDir(name, place.folder.with_name(name), tmp_path / "log" / "tfcompose" / name)
+def replace_name(runtime_dir: RuntimeDir, name: str, tmp_path: Path) -> RuntimeDir:
+    return RuntimeDir(
+        name, runtime_dir.folder.with_name(name), tmp_path / "log" / "tfcompose" / name
+    )
 
 
 def test_the_plan_of_the_domains_robot_is_known(
@@ -197,10 +199,10 @@ def test_monitor_takes_the_topics_of_the_robot_in_the_domain(
     )
     processes = tuple(PlanProcess(name, "external", remap=remap) for name, remap in remaps.items())
     one = replace(PLAN, edges=planned[:1], processes=processes[:1])
-    place = runs("rover", 67)
+    runtime_dir = runs("rover", 67)
     monkeypatch.setattr("tfcompose.cli.runs.plan_of_run", lambda _: one)
     assert monitor._namespace_here() == "/robot1"
-    assert place.name in capsys.readouterr().err
+    assert runtime_dir.name in capsys.readouterr().err
     monkeypatch.setattr(
         "tfcompose.cli.runs.plan_of_run",
         lambda _: replace(PLAN, edges=planned, processes=processes),

@@ -23,8 +23,8 @@ def test_a_robot_in_the_background_warns_of_a_logout_that_removes_its_folder(
     monkeypatch.setattr(starting, "user_name", lambda: "robot")
     monkeypatch.setattr(starting, "_fork", lambda *_: 7)
     monkeypatch.setattr(starting, "_follow", lambda *_: 0)
-    place = RuntimeDir("rover@0", tmp_path, tmp_path)
+    runtime_dir = RuntimeDir("rover@0", tmp_path, tmp_path)
     plan = Plan("rover", "", None, RosSettings(), (), ())
     lock = session = cast("Any", None)
-    assert starting._detach(plan, place, lock, session, Namespace(duration=None)) == 0
+    assert starting._detach(plan, runtime_dir, lock, session, Namespace(duration=None)) == 0
     assert capsys.readouterr().err.count("loginctl enable-linger robot") == goes

@@ -29,8 +29,8 @@ def test_a_robot_that_runs_by_a_variant_is_named_first(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    place = RuntimeDir("rover@7", tmp_path, tmp_path)
-    monkeypatch.setattr(runs, "run_of_domain", lambda: (place, running))
+    runtime_dir = RuntimeDir("rover@7", tmp_path, tmp_path)
+    monkeypatch.setattr(runs, "run_of_domain", lambda: (runtime_dir, running))
     other = verify.other_plan(Namespace(bag=None), REAL)
     assert (other is running) is is_other
     assert ("rover@7" in capsys.readouterr().err) is is_other
@@ -39,6 +39,6 @@ def test_a_robot_that_runs_by_a_variant_is_named_first(
 def test_nothing_is_advised_against_a_process_of_the_plan_that_runs() -> None:
     wrong = finding("TF801", "a → b is published by /d; the owner is x (/x)", None, help="end /d")
     other = finding("TF801", "a → b is published by /e; the owner is x (/x)", None, help="end /e")
-    (first, second) = verify.of_other_plan(Verdict("a → b", "x", (wrong, other)), DEMO).found
+    (first, second) = verify.of_other_plan(Verdict("a → b", "x", (wrong, other)), DEMO).findings
     assert "--running" in first.help
     assert second == other

@@ -93,10 +93,10 @@ links:
   base_link: {{visual: {{mesh: {mesh}}}}}
   top: {{parent: base_link, xyz: [0, 0, 0.5]}}
 """
-    found = [
+    findings = [
         finding
-        for finding in compile_robot(text, "r.yaml", library(), disk=disk()).found
+        for finding in compile_robot(text, "r.yaml", library(), disk=disk()).findings
         if finding.code == "TF414"
     ]
-    assert [finding.span.line for finding in found if finding.span] == [4] * bool(advice)
-    assert all(advice in finding.help for finding in found if advice)
+    assert [finding.span.line for finding in findings if finding.span] == [4] * bool(advice)
+    assert all(advice in finding.help for finding in findings if advice)

@@ -18,7 +18,7 @@ from tfcompose.foundation.catalogue import (
     similar_words,
 )
 from tfcompose.foundation.findings import finding
-from tfcompose.foundation.tool import shipped
+from tfcompose.foundation.tool import shipped_tools
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tfcompose"
@@ -160,7 +160,7 @@ def test_later_folders_are_read_only_for_codes_that_are_in_none_before(
 
 
 def test_codes_of_tools_are_in_their_folders_and_in_the_catalogue() -> None:
-    for tool in shipped().tools:
+    for tool in shipped_tools().tools:
         for code in tool.code_names():
             assert CATALOGUE[code].code == code
             assert not (FOLDER / f"{code}.md").exists()

@@ -47,7 +47,7 @@ def test_the_launcher_takes_an_interrupt_that_python_threw_away(lost: list[objec
         assert not lost, "it would be printed"
         with Signals() as signals:
             assert os.read(signals.fd, 10)
-            assert list(signals.taken()) == [signal.SIGINT]
+            assert list(signals.take()) == [signal.SIGINT]
     assert not take_interrupt()
 
 

@@ -65,12 +65,12 @@ def settle(text: str, profiles: tuple[str, ...] = ()) -> None:
     assert compiled.robot or compiled.errors
     lines = text.splitlines()
     render_text(
-        compiled.found,
+        compiled.findings,
         lambda _, line: lines[line - 1] if line <= len(lines) else None,
         colour=True,
     )
-    json.loads(render_json(compiled.found))
-    assert not [one for one in compiled.found if one.code == "TF903"]
+    json.loads(render_json(compiled.findings))
+    assert not [one for one in compiled.findings if one.code == "TF903"]
     if compiled.robot and not compiled.errors:
         for file in emit(compiled.robot):
             file.text.encode()

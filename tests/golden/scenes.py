@@ -59,7 +59,7 @@ from tfcompose.compiler.urdf.packages import Disk, Packages
 from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.foundation.tool import Command as ToolCommand
-from tfcompose.foundation.tool import Key, Tool, installed
+from tfcompose.foundation.tool import Key, Tool, installed_tools
 from tfcompose.guard.losses import datagrams_lost
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.drivers import SentPoses, not_taken
@@ -535,10 +535,10 @@ def launcher() -> Iterator[Finding]:
     with TemporaryDirectory() as folder, inside(folder):
         for plan, env in _unfit():
             base, file = {"PATH": "/nowhere", **env}, Path(folder, "plan.json")
-            found = commands_of(
+            findings = commands_of(
                 plan, list(plan.processes), file, base, environment.child_environment
             )[1]
-            yield from (_without(one, folder) for one in found)
+            yield from (_without(one, folder) for one in findings)
     held = PlanProcess("lidar", "run", schedule=Schedule((4095,)))
     yield from check_settings(held) or [AN_EXAMPLE]
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
@@ -546,12 +546,12 @@ def launcher() -> Iterator[Finding]:
         yield from check_settings(real_time) or [AN_EXAMPLE]
 
 
-def _without(found: Finding, folder: str) -> Finding:
+def _without(finding: Finding, folder: str) -> Finding:
     """Return the finding with the name of a folder that stays the same."""
     notes = tuple(
-        replace(note, message=note.message.replace(folder, "FOLDER")) for note in found.notes
+        replace(note, message=note.message.replace(folder, "FOLDER")) for note in finding.notes
     )
-    return replace(found, message=found.message.replace(folder, "FOLDER"), notes=notes)
+    return replace(finding, message=finding.message.replace(folder, "FOLDER"), notes=notes)
 
 
 def _machines() -> Iterator[Any]:
@@ -780,8 +780,8 @@ def _no_bag() -> None:
     raise BagError("bag is no bag: it has no metadata.yaml", "ros2 bag reindex bag")
 
 
-def _rejected(found: list[Finding], *_: object) -> None:
-    raise RejectedError(found)
+def _rejected(findings: list[Finding], *_: object) -> None:
+    raise RejectedError(findings)
 
 
 @rule("TF201")
@@ -827,7 +827,7 @@ def compiled() -> Iterator[Finding]:
             side_effect=UnmeasurableError(code, why, "pip install 'tfcompose[mesh]'")
         )
         here = Disk(mock.Mock(return_value=""), lambda _: True, lambda _: True, moments=moments)
-        yield from compile_robot(mass, "r.yaml", library(), read=mock.Mock(), disk=here).found
+        yield from compile_robot(mass, "r.yaml", library(), read=mock.Mock(), disk=here).findings
     for form in ("package", "file"):
         yield writing._without_address(Asset("meshes/a.stl", Span("r.yaml", 7, 16, 7, 29)), form)
     sound = compile_robot(ROVER, "rover.yaml", library()).robot
@@ -840,7 +840,7 @@ def _with_preset(name: str, text: str, robot: str) -> Iterator[Finding]:
     file = Path("presets", f"{name}.yaml")
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text, encoding="utf-8")
-    yield from compile_robot(robot, "r.yaml", library()).found
+    yield from compile_robot(robot, "r.yaml", library()).findings
 
 
 def recordings() -> Iterator[Finding]:
@@ -886,7 +886,7 @@ def imported() -> Iterator[Finding]:
     draft = ImportDraft("rover")
     lines = "sleep 3\nros2 run tf2_ros static_transform_publisher 0 0 0 base_link laser\n"
     add_script(draft, lines, "start.sh", Target())
-    yield from draft.found
+    yield from draft.findings
 
 
 # Hosts.
@@ -907,8 +907,8 @@ def foreign_tools() -> Iterator[Finding]:
         mock.patch.dict(sys.modules, {module.__name__: module}),
         mock.patch("tfcompose.foundation.tool._entry_points", return_value=entries),
     ):
-        tools = installed.__wrapped__()
-    with mock.patch("tfcompose.spec.language.tool_keys.installed", return_value=tools):
+        tools = installed_tools.__wrapped__()
+    with mock.patch("tfcompose.spec.language.tool_keys.installed_tools", return_value=tools):
         yield from problems_with({"fifth"})
 
 
@@ -984,8 +984,8 @@ async def _rolled_out(rollout: Rollout) -> list[Finding]:
     try:
         await rollout.lock()
         await rollout.compare(release_of())
-        if found := rollout.strangers():
-            return found
+        if findings := rollout.strangers():
+            return findings
         await rollout.send()
         await rollout.activate()
         await rollout.plan_return()

@@ -99,7 +99,7 @@ def within(
     files = replace(disk(), read=read, is_file=is_file, expand=expanded)
     compiled = compile_robot(text, file, presets(), read=read, disk=files, **more)
     return [
-        *compiled.found,
+        *compiled.findings,
         *(unused_allows(compiled.allows, set(compiled.used)) if not more else []),
     ]
 
@@ -301,8 +301,8 @@ def calibrations() -> Iterator[Case]:
         for number in range(-1, 10):
             wrong = mutated(text, f"{path.name} {number}") if number >= 0 else text
             for kind, use in (("of frames", robot), ("of all", full)):
-                found = within(use.replace("FILE", path.name), "robot.yaml", {path.name: wrong})
-                yield f"{path.name} {number} {kind}", path.name, found
+                findings = within(use.replace("FILE", path.name), "robot.yaml", {path.name: wrong})
+                yield f"{path.name} {number} {kind}", path.name, findings
 
 
 CORPORA: dict[str, Callable[[], Iterator[Case]]] = {
@@ -323,23 +323,23 @@ def rows(name: str) -> list[str]:
     """Return the rows of a corpus, sorted within each case; a case without findings is one row."""
     with in_the_repository():
         made = []
-        for case, file, found in CORPORA[name]():
-            made += [f"{case}: {row}\n" for row in sorted(row_of(one, file) for one in found)] or [
-                f"{case}: none\n"
-            ]
+        for case, file, findings in CORPORA[name]():
+            made += [
+                f"{case}: {row}\n" for row in sorted(row_of(one, file) for one in findings)
+            ] or [f"{case}: none\n"]
         return made
 
 
-def row_of(found: Finding, file: str) -> str:
+def row_of(finding: Finding, file: str) -> str:
     """Return a finding's code and places, in which the name of the case's own file is left out."""
-    words = [found.code, place(found.span, file)]
-    words += ["warning"] if found.severity == "warning" else []
+    words = [finding.code, place(finding.span, file)]
+    words += ["warning"] if finding.severity == "warning" else []
     words += [
         f"fix {place(one.span, file)} {json.dumps(one.text, ensure_ascii=False)}"
-        for one in ordered(found.edits)
+        for one in ordered(finding.edits)
     ]
     return " ".join(
-        [*words, *sorted(f"note {place(one.span, file)}" for one in found.notes if one.span)]
+        [*words, *sorted(f"note {place(one.span, file)}" for one in finding.notes if one.span)]
     )
 
 

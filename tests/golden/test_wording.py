@@ -37,8 +37,8 @@ FAMILIES = ("TF0", "TF1", "TF2", "TF3", "TF4", "TF5", "TF6", "TF7", "TF8", "TF9"
 def findings() -> Iterator[Finding]:
     with in_the_repository():
         for name in IN_SOURCE:
-            for _, _, found in CORPORA[name]():
-                yield from found
+            for _, _, findings in CORPORA[name]():
+                yield from findings
         for file in TEXTS:
             os.chdir(file.parent)
             yield from refusals(lambda file=file: within(file.read_text("utf-8"), file.name))  # type: ignore[misc]
@@ -61,13 +61,17 @@ def texts() -> dict[str, str]:
     }
 
 
-def text_of(found: Finding) -> str:
+def text_of(finding: Finding) -> str:
     """Return the finding as ``lint`` prints it, but for its places.
 
     Those stand in the golden findings.
     """
-    lines = render_text([found], lambda _file, _line: None, colour=False).splitlines(keepends=True)
-    return (lines[0].removeprefix(f"{found.span}: ") + "".join(lines[1:])).replace(f"{ROOT}/", "")
+    lines = render_text([finding], lambda _file, _line: None, colour=False).splitlines(
+        keepends=True
+    )
+    return (lines[0].removeprefix(f"{finding.span}: ") + "".join(lines[1:])).replace(
+        f"{ROOT}/", ""
+    )
 
 
 def test_findings_say_what_the_golden_files_say_and_every_code_is_there() -> None:

@@ -39,7 +39,7 @@ def test_what_is_wrong_now_is_reported_when_it_changes(monkeypatch: pytest.Monke
         report()
         current = events[-1] if events else CurrentFindings(())
         assert isinstance(current, CurrentFindings)
-        return [found.code for found in current.findings]
+        return [finding.code for finding in current.findings]
 
     drive = running.joins("/drive")
     running.repeat(drive, "odom base", 20)

@@ -56,7 +56,9 @@ def test_findings_name_the_lines_of_the_plan_that_is_followed_now(running: Histo
 
     def lines() -> set[int]:
         notes = [
-            note.message for found in (*judge.wrong(), *judge.live.wrong()) for note in found.notes
+            note.message
+            for finding in (*judge.wrong(), *judge.live.wrong())
+            for note in finding.notes
         ]
         return {int(line) for note in notes for line in re.findall(r"rover.yaml:(\d+)", note)}
 
@@ -130,9 +132,9 @@ def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_na
 def test_a_foreign_publisher_is_named_once_and_at_the_next_check(running: History) -> None:
     rogue = running.joins("/rogue")
     running.send(rogue, "map odom").wait(TICK_S).repeat(rogue, "map odom", 100)
-    (found,) = running.found()
-    expect(found, "TF801", "map → odom", "/rogue", "slam (/slam)", "rover.yaml:7")
-    assert found.severity == "error"
+    (finding,) = running.found()
+    expect(finding, "TF801", "map → odom", "/rogue", "slam (/slam)", "rover.yaml:7")
+    assert finding.severity == "error"
 
 
 def test_a_foreign_publisher_that_ended_is_reported_to_have_and_is_reported_when_it_comes_again(
@@ -178,9 +180,9 @@ def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_messag
 ) -> None:
     rogue = running.joins("/rogue", static=True)
     running.send(rogue, "base lidar").send(rogue, "base camera").wait(TICK_S)
-    (found,) = running.found()
-    expect(found, "TF801", "base → lidar and 1 more", "/rogue", "static (/static)")
-    assert [note.message for note in found.notes][:2] == ["base → lidar", "base → camera"]
+    (finding,) = running.found()
+    expect(finding, "TF801", "base → lidar and 1 more", "/rogue", "static (/static)")
+    assert [note.message for note in finding.notes][:2] == ["base → lidar", "base → camera"]
 
 
 def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood_together(
@@ -239,7 +241,7 @@ def test_an_undeclared_edge_is_reported_as_the_policy_says(
 ) -> None:
     running = History(GuardPolicy(unknown_edges=policy)).clear()  # type: ignore[arg-type]
     running.repeat(running.joins("/tracker"), "map person", 10)
-    assert [(found.code, found.severity) for found in running.found()] == [
+    assert [(finding.code, finding.severity) for finding in running.found()] == [
         ("TF803", one) for one in severities
     ]
 
@@ -248,9 +250,9 @@ def test_only_undeclared_edges_that_no_pattern_allows_are_reported() -> None:
     running = History(GuardPolicy(allow=(EdgePattern("map", "person_*"),))).clear()
     tracker = running.joins("/tracker")
     running.repeat(tracker, "map person_1, odom person_2, map person", 3)
-    (found,) = running.found()
-    expect(found, "TF803", "odom → person_2 and 1 more", "/tracker")
-    assert [note.message for note in found.notes] == ["odom → person_2", "map → person"]
+    (finding,) = running.found()
+    expect(finding, "TF803", "odom → person_2 and 1 more", "/tracker")
+    assert [note.message for note in finding.notes] == ["odom → person_2", "map → person"]
 
 
 def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(
@@ -259,8 +261,8 @@ def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(
     running.joins("/static", static=True, volatile=True)
     running.joins("/slam", volatile=True)
     running.wait(5)
-    (found,) = running.found()
-    expect(found, "TF806", "/static", "/tf_static", "base → lidar")
+    (finding,) = running.found()
+    expect(finding, "TF806", "/static", "/tf_static", "base → lidar")
 
 
 @pytest.mark.parametrize("late", [0.0, 5.0])
@@ -273,9 +275,9 @@ def test_an_owner_that_replaced_an_unheard_latched_edge_is_reported_once(
     running.send(static, "base camera").wait(1)
     assert running.reports() == []
     running.wait(5)
-    (found,) = running.found()
-    expect(found, "TF850", "/static", "1 message", "/tf_static", "base → lidar")
-    assert found.severity == "warning"
+    (finding,) = running.found()
+    expect(finding, "TF850", "/static", "1 message", "/tf_static", "base → lidar")
+    assert finding.severity == "warning"
     running.dies()
     running.wait(10)
     assert running.found() == []
@@ -309,7 +311,7 @@ def test_of_who_has_new_frames_again_and_again_is_reported_ever_more_rarely_and_
         assert len(texts) < 20
         counted = [re.search(r"and (\d+) more", one) for one in texts]
         assert sum(1 + int(more[1]) if more else 1 for more in counted) == 600
-    found = [event.found for event in running.events if isinstance(event, FindingShown)]
-    assert "child: 'tag_*'}" in (found[-1].help or "")
+    findings = [event.found for event in running.events if isinstance(event, FindingShown)]
+    assert "child: 'tag_*'}" in (findings[-1].help or "")
     running.send(tracker, "base tag_600").wait(0.5)
     assert "base → tag_600" in running.reports()[-1], "after some quiet it is told at once again"

@@ -18,9 +18,9 @@ def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_righ
 ) -> None:
     slam = running.joins("/slam")
     stamped(running, slam, "map odom", [5 + n / 10 for n in range(10)])
-    (found,) = running.found()
-    expect(found, "TF825", "/slam", "map → odom", "stamped 5.", "simulated")
-    assert found.severity == "error"
+    (finding,) = running.found()
+    expect(finding, "TF825", "/slam", "map → odom", "stamped 5.", "simulated")
+    assert finding.severity == "error"
     for _ in range(40):
         running.send(slam, "map odom", stamp_s=wall(running)).wait(0.1)
     (over,) = running.over()
@@ -44,7 +44,7 @@ def test_a_clock_that_is_more_than_ten_seconds_off_is_wrong(
     slam = running.joins("/slam")
     for _ in range(10):
         running.send(slam, "map odom", stamp_s=0 if off is None else wall(running) + off).wait(0.1)
-    assert [found.code for found in running.found() if found.code != "TF823"] == (
+    assert [finding.code for finding in running.found() if finding.code != "TF823"] == (
         ["TF825"] if reports else []
     )
     assert not reports or reports in running.reports()[0]
@@ -54,7 +54,7 @@ def test_one_stray_stamp_is_no_wrong_clock(running: History) -> None:
     slam = running.joins("/slam")
     for n in range(50):
         running.send(slam, "map odom", stamp_s=wall(running) - 100 * (n % 10 == 0)).wait(0.1)
-    assert "TF825" not in {found.code for found in running.found()}
+    assert "TF825" not in {finding.code for finding in running.found()}
 
 
 @pytest.mark.parametrize("off", [0.0, -60.0])
@@ -70,7 +70,7 @@ def test_what_waited_while_the_guard_was_kept_from_running_reports_nothing_of_it
     assert running.check().reports() == []
     for _ in range(60):
         running.send(slam, "map odom", stamp_s=wall(running) + off).wait(0.1)
-    assert [found.code for found in running.found() if found.code != "TF824"] == (
+    assert [finding.code for finding in running.found() if finding.code != "TF824"] == (
         ["TF825"] if off else []
     )
 
@@ -110,7 +110,7 @@ def test_where_simulated_time_goes_slowly_rates_are_judged_by_it(
             running.judge.clock(round(sim_s * 1e9), running.now)
             running.send(drive, "odom base", stamp_s=sim_s).wait(every_s)
             sim_s += speed * every_s
-    assert [found.code for found in running.found()] == codes
+    assert [finding.code for finding in running.found()] == codes
 
 
 @pytest.mark.parametrize(("sent", "codes"), [(True, []), (False, ["TF804"])])
@@ -127,7 +127,7 @@ def test_nobody_is_silent_while_simulated_time_stands_unless_nobody_is_there_who
             sim_s += 0.05
         running.judge.clocks.sent = sent or not paused_s
         running.wait(paused_s)
-    assert [found.code for found in running.found()][:1] == codes
+    assert [finding.code for finding in running.found()][:1] == codes
     for _ in range(40):  # time goes on, and the owner does not
         running.judge.clock(round(sim_s * 1e9), running.now)
         running.wait(0.05)
@@ -151,7 +151,7 @@ def test_a_clock_that_is_read_twice_at_one_time_takes_no_stamps_with_it() -> Non
         for _ in range(2):
             running.judge.clock(round((20 + n / 10) * 1e9), running.now)
         running.send(drive, "odom base", stamp_s=20 + n // 20).wait(0.1)
-    assert [found.code for found in running.found()] == ["TF823"]
+    assert [finding.code for finding in running.found()] == ["TF823"]
 
 
 def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing(
@@ -177,11 +177,11 @@ def test_stamps_that_go_back_are_a_warning_if_far_or_often(
     for step in steps:
         stamps += [stamps[-1] + step, stamps[-1]]
     stamped(running, slam, "map odom, base camera", stamps)
-    assert [found.code for found in running.found() if found.code != "TF801"] == codes
+    assert [finding.code for finding in running.found() if finding.code != "TF801"] == codes
 
 
 def test_the_stamps_of_fixed_edges_and_of_strangers_are_not_judged(running: History) -> None:
     static, rogue = running.joins("/static", static=True), running.joins("/rogue")
     for _ in range(10):
         running.send(static, FIXED, stamp_s=0).send(rogue, "map odom", stamp_s=0).wait(0.1)
-    assert [found.code for found in running.found()] == ["TF801"]
+    assert [finding.code for finding in running.found()] == ["TF801"]

@@ -151,7 +151,7 @@ def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
     history = History(claims=(PlanClaim("/diff", "odom", "base", "x: false"),)).clear()
     history.repeat(history.joins("/other"), "odom base", 10)
     history.repeat(history.joins("/diff"), "map odom", 10)
-    assert [("set" in found.help) for found in history.found()] == [False, False]
+    assert [("set" in finding.help) for finding in history.found()] == [False, False]
 
 
 def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: History) -> None:

@@ -12,7 +12,7 @@ from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_
 from tests.support.guard_history import Publisher as Publishes
 from tfcompose.foundation.findings import Finding
 from tfcompose.guard.judge import Judge
-from tfcompose.guard.verdict.publishers import unfenced
+from tfcompose.guard.verdict.publishers import unfenced_finding
 from tfcompose.model.messages import Clear, FindingShown, Live, RecoveredShown, Taken, Unfenced
 from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import OtherRun, Publisher
@@ -63,7 +63,7 @@ def test_a_publisher_that_gets_its_name_late_is_named_once_and_has_not_ended(
 
 def test_a_publisher_that_never_gets_a_name_is_reported_at_last(running: History) -> None:
     running.repeat(running.joins(None), "map odom", 60)
-    assert [found.code for found in running.found()] == ["TF801"]
+    assert [finding.code for finding in running.found()] == ["TF801"]
 
 
 def test_a_publisher_that_sends_once_and_leaves_is_named(running: History) -> None:
@@ -123,7 +123,7 @@ def test_a_static_owner_that_leaves_is_reported_once(running: History) -> None:
     static = running.joins("/static", static=True)
     running.send(static, FIXED).wait(1).leaves(static)
     running.wait(10)
-    assert [found.code for found in running.found()] == ["TF804"]
+    assert [finding.code for finding in running.found()] == ["TF804"]
 
 
 def test_without_ids_nobody_is_blamed_where_the_owner_may_have_sent_it() -> None:
@@ -207,7 +207,7 @@ def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:
     running = History(gids=False).clear()
     running.joins("/slam_toolbox")
     running.repeat(running.joins("/other"), "map odom", 10)
-    assert [found.code for found in running.found()] == ["TF801"]
+    assert [finding.code for finding in running.found()] == ["TF801"]
 
 
 # Two with the owner's name: which is the owner is proven by processes, not by names.
@@ -277,9 +277,9 @@ def test_an_external_owner_may_be_started_by_another_process_of_the_plan() -> No
 def test_a_program_without_ros_is_called_one_and_not_by_what_the_middleware_calls_it() -> None:
     running = History().clear()
     running.repeat(running.joins(NO_NODE, process=""), "map odom", 3)
-    found = running.only()
-    expect(found, "TF801", NO_NODE)
-    assert found.help.startswith("stop it")
+    finding = running.only()
+    expect(finding, "TF801", NO_NODE)
+    assert finding.help.startswith("stop it")
 
 
 # A process of a strict plan that is not behind its fence.
@@ -381,8 +381,8 @@ def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped
 def test_the_finding_about_who_leaves_the_fence_names_the_line_to_move(
     profile: str, words: list[str]
 ) -> None:
-    found = unfenced("/slam", "slam", "/tf", profile, remapped=False)
-    assert all(word in found.help for word in words)
+    finding = unfenced_finding("/slam", "slam", "/tf", profile, remapped=False)
+    assert all(word in finding.help for word in words)
 
 
 @pytest.mark.parametrize(
@@ -411,11 +411,11 @@ def test_what_another_robot_publishes_is_one_finding_that_names_it_and_the_ways_
         running.send(wheels, "cart left_wheel, cart right_wheel").send(
             slam, "map odom, odom cart"
         ).wait(0.1)
-    found = running.found()
-    assert {one.code for one in found} == {"TF854"}
-    assert len(found) <= 2, "a warning of its own frames, and an error of those that both have"
+    findings = running.found()
+    assert {one.code for one in findings} == {"TF854"}
+    assert len(findings) <= 2, "a warning of its own frames, and an error of those that both have"
     expect(
-        found[-1],
+        findings[-1],
         "TF854",
         "other@0",
         "pid 4711",
@@ -471,9 +471,11 @@ def test_the_environment_of_another_robots_process_says_whose_run_it_is() -> Non
 # Several of one name: each is named by its process.
 
 
-def pids_of(found: Finding) -> list[int]:
+def pids_of(finding: Finding) -> list[int]:
     """Return the processes that a finding says to run, in order."""
-    runs = (re.search(r" runs on this machine as pid (\d+)", note.message) for note in found.notes)
+    runs = (
+        re.search(r" runs on this machine as pid (\d+)", note.message) for note in finding.notes
+    )
     return sorted(int(match[1]) for match in runs if match)
 
 
@@ -511,7 +513,7 @@ def test_each_of_three_namesakes_is_named_and_who_remains(mode: GuardMode, owner
         present.remove(leaving)
         send_all(running, present, edges, 10.0)
         new = History.findings_in(running.events[before:])
-        assert [pids_of(found) for found in new] == [[*anybody, *remaining]]
+        assert [pids_of(finding) for finding in new] == [[*anybody, *remaining]]
         expect(new[0], "TF801", f"another /{owner}", f"pid {ended}")
     assert running.over() == []
     running.leaves(namesakes[2])
@@ -528,7 +530,7 @@ def test_of_ten_strangers_and_ten_namesakes_each_is_named(mode: GuardMode) -> No
     rogues += [running.joins("/slam", process="", pid=pid) for pid in range(30, 40)]
     send_all(running, [slam, *rogues], "map odom", 2.0)
     for findings in (running.found(), running.judge.wrong()):
-        assert sorted(pid for found in findings for pid in pids_of(found)) == [*range(20, 40)]
+        assert sorted(pid for finding in findings for pid in pids_of(finding)) == [*range(20, 40)]
         assert len(findings) == 11
 
 
@@ -554,7 +556,7 @@ def test_an_edge_is_over_when_no_publisher_of_that_name_sends_it(
     first, other = (running.joins("/rogue", process="", pid=pid) for pid in (11, 12))
     for _ in range(10):
         running.send(first, "map odom").send(other, "map odom, odom base").wait(0.1)
-    assert [pids_of(found) for found in running.found()] == [[11, 12]]
+    assert [pids_of(finding) for finding in running.found()] == [[11, 12]]
     running.leaves(other)
     send_all(running, [first], "map odom", 5.0)
     (over,) = running.over()
@@ -569,8 +571,8 @@ def test_the_publishers_of_one_process_are_one(running: History) -> None:
         running.joins("/rogue", static=static, process="", pid=11) for static in (False, True)
     )
     running.send(fixed, "base lidar").repeat(moving, "base lidar", 5)
-    (found,) = running.found()
-    assert pids_of(found) == [11]
+    (finding,) = running.found()
+    assert pids_of(finding) == [11]
     running.leaves(fixed)
     running.repeat(moving, "base lidar", 50)
     assert (running.over(), len(running.found())) == ([], 1)

@@ -31,7 +31,7 @@ def test_a_second_parent_before_the_start_is_taken_and_says_so(history: History)
 
 def test_an_undeclared_edge_before_the_start_keeps_nothing_from_starting(history: History) -> None:
     history.repeat(history.joins("/tracker"), "map person", 20)
-    assert (history.all(Taken), [found.code for found in history.found()]) == ([], ["TF803"])
+    assert (history.all(Taken), [finding.code for finding in history.found()]) == ([], ["TF803"])
     assert Clear() in history.events
 
 

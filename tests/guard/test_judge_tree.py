@@ -52,7 +52,7 @@ def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(
     one, other = running.joins("/one"), running.joins("/other")
     for _ in range(5):
         running.send(one, "base cup").send(other, "cup map").wait(0.1)
-    loop = next(found.message for found in running.found() if found.code == "TF820")
+    loop = next(finding.message for finding in running.found() if finding.code == "TF820")
     assert loop.endswith("cup → map from /other")
     assert "the frames map → odom → base → cup → map" in next(
         reports for reports in running.reports() if "TF820" in reports
@@ -103,8 +103,8 @@ def test_two_nodes_that_publish_one_allowed_frame_are_named(running: History) ->
     for _ in range(10):
         running.send(a, "map person_1").send(b, "odom person_1").wait(0.1)
     assert len(running.found()) in {1, 2}
-    for found in running.found():
-        expect(found, "TF822", "person_1", "/a", "/b")
+    for finding in running.found():
+        expect(finding, "TF822", "person_1", "/a", "/b")
 
 
 def test_a_node_that_was_started_anew_is_no_second_writer() -> None:
@@ -238,7 +238,7 @@ def test_a_flood_is_reported_with_how_much_and_how_often() -> None:
     rogue = running.joins("/rogue")
     running.check()
     for _ in range(25):
-        running.judge.flooded_by(rogue.gid, 10_000, running.now)
+        running.judge.report_flood(rogue.gid, 10_000, running.now)
         running.wait(0.05)
     expect(
         next(one for one in running.found() if one.code == "TF853"),

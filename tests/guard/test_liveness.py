@@ -61,7 +61,7 @@ class History:
         for at, child in sorted([*arrivals, *ticks]):
             self.now = begun + at
             self.events += (
-                self.live.arrived((child,), self.now) if child else self.live.judge(self.now)
+                self.live.note_arrivals((child,), self.now) if child else self.live.judge(self.now)
             )
         self.now = begun + seconds
         return self
@@ -76,8 +76,8 @@ class History:
         return [event.found for event in self.events if isinstance(event, FindingShown)]
 
     def only(self) -> Finding:
-        (found,) = self.found()
-        return found
+        (finding,) = self.found()
+        return finding
 
     def over(self) -> list[str]:
         return [event.text for event in self.events if isinstance(event, RecoveredShown)]
@@ -100,7 +100,7 @@ def test_what_comes_in_one_message_is_announced_in_few_events(
     history = watch(*(edge(f"base {name}", "static", kind="static") for name in names))
     live = [
         event
-        for event in history.live.arrived(tuple(names), history.now)
+        for event in history.live.note_arrivals(tuple(names), history.now)
         if isinstance(event, Live)
     ]
     assert [len(event.children) for event in live] == [1000, 1000, 500]
@@ -235,7 +235,7 @@ def test_an_owner_that_sends_a_tenth_of_what_is_declared_is_silent_then_slow_and
     watch: Callable[..., History],
 ) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(3, 10, "odom").steadily(60, 1, "odom")
-    assert [found.code for found in history.found()] == ["TF804", "TF805"]
+    assert [finding.code for finding in history.found()] == ["TF804", "TF805"]
     assert history.over() == []
     assert len(history.steadily(5, 10, "odom").over()) == 1
 
@@ -264,7 +264,7 @@ def test_a_guard_that_was_kept_from_running_reports_nothing_false(
     )  # before what has come meanwhile is delivered
     history.run(late_s)
     for child in ["odom"] * 20 + ["base"] * 100:
-        history.live.arrived((child,), history.now)
+        history.live.note_arrivals((child,), history.now)
     history.steadily(6, 10, "odom", "base", "base", "base", "base", "base")
     assert history.found() == []
     assert len(history.run(2).found()) == 2
@@ -286,7 +286,7 @@ def test_jitter_and_checks_at_uneven_times_find_nothing(
         now += pause
         while sent < len(times) and times[sent] <= now:
             at = max(at, times[sent])
-            live.arrived(("odom",), now if pause > TICK_S else at)
+            live.note_arrivals(("odom",), now if pause > TICK_S else at)
             sent += 1
         if sent < len(times):
             assert [event for event in live.judge(now) if isinstance(event, FindingShown)] == []
@@ -299,8 +299,8 @@ def test_a_latching_owner_that_leaves_is_reported_once_and_when_it_is_back(
         edge("base lidar", "static", None, "static"), edge("base imu", "static", None, "static")
     ).live
     assert live.static_writers([]) == []
-    live.arrived(("lidar",), 1)
-    live.arrived(("imu",), 1)
+    live.note_arrivals(("lidar",), 1)
+    live.note_arrivals(("imu",), 1)
     assert live.static_writers(["/static", "/other"]) == []
     (found,) = live.static_writers(["/other"])
     assert isinstance(found, FindingShown)
@@ -315,10 +315,10 @@ def test_edges_may_come_together_apart_and_in_other_company(watch: Callable[...,
     history = watch(*(edge(f"base {child}", "drive", 4) for child in "abc"))
     for _ in range(10):
         for children in (("a", "b", "c"), ("a", "b"), ("b", "c"), ("c",), ("a", "c")):
-            history.live.arrived(children, history.now)
+            history.live.note_arrivals(children, history.now)
             history.run(0.1)
     assert history.found() == []
     for _ in range(20):
-        history.live.arrived(("a", "b"), history.now)
+        history.live.note_arrivals(("a", "b"), history.now)
         history.run(0.1)
     expect(history.only(), "TF804", " base → c ")

@@ -39,7 +39,7 @@ class Watch:
             self.now += 1 / HERTZ
             self.watch.take(lost, self.now)
             for child in children:
-                self.events += self.judge.live.arrived((child,), self.now)
+                self.events += self.judge.live.note_arrivals((child,), self.now)
             self.events += self.judge.tick(self.now)
         return self
 
@@ -79,9 +79,9 @@ def test_a_loss_is_reported_once_and_when_it_is_over(watch: Watch) -> None:
 
 @pytest.mark.parametrize(("limit", "named"), [(212_992, 1), (None, 1), (WANTED, 0)], ids=str)
 def test_the_sysctl_is_named_where_it_helps(limit: int | None, named: int) -> None:
-    found = datagrams_lost(7, limit)
-    assert str(found.help).count("net.core.rmem_max=") == named
-    assert "7" in found.message
+    finding = datagrams_lost(7, limit)
+    assert str(finding.help).count("net.core.rmem_max=") == named
+    assert "7" in finding.message
 
 
 def test_the_buffers_are_widened_where_the_limit_was_raised(

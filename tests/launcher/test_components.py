@@ -146,7 +146,7 @@ def test_an_answer_of_the_container_before_says_nothing_about_the_one_after() ->
 def test_a_container_that_ends_for_good_takes_its_components_with_it() -> None:
     history = loaded(component("a", required=False), box=replace(BOX, required=False))
     history.feed(Exited("box", 3))
-    codes = [(found.code, found.severity) for found in history.found()]
+    codes = [(finding.code, finding.severity) for finding in history.found()]
     assert codes == [("TF808", "warning"), ("TF808", "warning")]
     expect(history.found()[1], "TF808", "a", "box")
 
@@ -236,8 +236,8 @@ def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -
         Clear(), GateState("box", "there", is_open=True)
     )
     history.wait(31).wait(31)
-    (found,) = history.late
-    expect(found, "TF817", "a", "box")
+    (finding,) = history.late
+    expect(finding, "TF817", "a", "box")
     assert waits_for(history.state, history.state.tracked["a"]).startswith("box")
 
 

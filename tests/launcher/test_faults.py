@@ -126,14 +126,14 @@ class Run:
     ) -> None:
         file = folder / "plan.json"
         file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), planned)))
-        self.place = RuntimeDir(NAME, folder / "place", folder / "log")
+        self.runtime_dir = RuntimeDir(NAME, folder / "place", folder / "log")
         command = [sys.executable, "-c", clock + LAUNCHER, str(file), NAME, *words]
         self.popen = processes.start(command, stdout=stdout, cwd=folder)
 
     def ps(self) -> dict[str, ProcessStatus]:
         return {
             process.name: process
-            for process in ask(self.place, StatusRequest(), RobotStatus).processes
+            for process in ask(self.runtime_dir, StatusRequest(), RobotStatus).processes
         }
 
     def is_up(self) -> bool:
@@ -149,7 +149,7 @@ class Run:
         self.ps()  # it is answered in the turn after that one
 
     def down(self) -> int:
-        assert ask(self.place, DownRequest(), Done).ok
+        assert ask(self.runtime_dir, DownRequest(), Done).ok
         return self.popen.wait(TIMEOUT_S)
 
 
@@ -260,7 +260,7 @@ def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_ag
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     first = int((tmp_path / "daemon").read_text())
     calm = run.ps()["calm"].pid
-    ask(run.place, ProcessRequest(how, "lidar"), Done)
+    ask(run.runtime_dir, ProcessRequest(how, "lidar"), Done)
     assert until(lambda: gone(first))
     if how == "restart":
         assert until(lambda: (tmp_path / "daemon").read_text() not in {"", str(first)})
@@ -361,7 +361,7 @@ def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(
     def cycle(count: int) -> None:
         for _ in range(count):
             for verb, state in verbs:
-                assert ask(run.place, ProcessRequest(verb, "a"), Done).ok
+                assert ask(run.runtime_dir, ProcessRequest(verb, "a"), Done).ok
                 assert until(lambda state=state: run.ps()["a"].state == state)  # type: ignore[misc]
 
     cycle(5)
@@ -390,7 +390,7 @@ def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
     (tmp_path / "back").touch()
     assert until(lambda: run.ps()["failing"].state == "fatal"), "1 s and 2 s of waiting are over"
     assert (run.ps()["a"].uptime or 0) > 2
-    assert ask(run.place, ProcessRequest("restart", "a"), Done).ok
+    assert ask(run.runtime_dir, ProcessRequest("restart", "a"), Done).ok
     assert until(lambda: run.ps()["a"].restarts == 1)
     assert run.down() == 0
     stamps = [
@@ -406,11 +406,11 @@ def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(
     assert until(first.is_up)
     first.popen.kill()
     first.popen.wait()
-    assert first.place.socket.exists()
-    assert first.place.holder() is None
+    assert first.runtime_dir.socket.exists()
+    assert first.runtime_dir.holder() is None
     second = launch(program("a", SLEEPER))
     assert until(second.is_up)
-    assert second.place.socket.stat().st_mode & 0o777 == 0o600
+    assert second.runtime_dir.socket.stat().st_mode & 0o777 == 0o600
     assert second.down() == 0
 
 
@@ -424,7 +424,7 @@ def test_rubbish_on_the_socket_is_answered_and_harms_nobody(
 ) -> None:
     run = launch(program("a", SLEEPER))
     assert until(run.is_up)
-    with connect(run.place) as connection:
+    with connect(run.runtime_dir) as connection:
         try:
             connection.sendall(line + b"\n")
             assert b"error" in connection.recv(1000) or len(line) > 100_000

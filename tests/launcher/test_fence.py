@@ -100,8 +100,8 @@ def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_alone_re
     slam = PlanProcess(
         "slam", "run", argv=("true",), remap={"/tf": "/r/tf"}, owns=(("map", "odom"),)
     )
-    commands, found = inspect(tmp_path, slam, GUARD)
-    assert found == []
+    commands, findings = inspect(tmp_path, slam, GUARD)
+    assert findings == []
     assert partitions(commands["slam"]) == {
         ("data_writer", "/r/tf"): "tfc_rover",
         ("data_writer", "/tf_static"): "tfc_rover",
@@ -191,11 +191,11 @@ USERS = """<?xml version="1.0" encoding="ISO-8859-1"?>
 def test_the_fence_is_merged_into_a_users_own_profiles(tmp_path: Path) -> None:
     (tmp_path / "own.xml").write_text(USERS, encoding="iso-8859-1")
     drive = replace(SLAM, name="drive", cwd=str(tmp_path), owns=(("odom", "base"),))
-    commands, found = inspect(
+    commands, findings = inspect(
         tmp_path, drive, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=str(tmp_path / "own.xml")
     )
     relative, more = inspect(tmp_path, drive, FASTRTPS_DEFAULT_PROFILES_FILE="own.xml")
-    assert found == more == []
+    assert findings == more == []
     assert commands["drive"].fence == relative["drive"].fence, (
         "a relative path is one of the process's folder"
     )
@@ -235,8 +235,8 @@ def test_a_process_that_sends_on_topics_that_nobody_judges_is_left_alone(tmp_pat
         remap={"/tf": "/x/tf", "/tf_static": "/x/s"},
     )
     for fence in ("partition", "remap"):
-        commands, found = inspect(tmp_path, SLAM, debug, GUARD, fence=fence)
-        assert found == []
+        commands, findings = inspect(tmp_path, SLAM, debug, GUARD, fence=fence)
+        assert findings == []
         assert commands["debug"].fence is None
         assert commands["debug"].argv[1:] == ()
 
@@ -281,9 +281,9 @@ def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
         PlanProcess(name, "run", argv=("true",), remap=remap, owns=(("map", name),))
         for name in ("slam", "drive")
     ]
-    _, (found,) = inspect(tmp_path, *both, fence="partition", **env)
-    expect(found, "TF902", *names)
-    assert found.message.endswith(": slam, drive")
+    _, (finding,) = inspect(tmp_path, *both, fence="partition", **env)
+    expect(finding, "TF902", *names)
+    assert finding.message.endswith(": slam, drive")
 
 
 OWN = "FASTRTPS_DEFAULT_PROFILES_FILE"
@@ -302,9 +302,9 @@ def test_an_owner_whose_command_names_a_profile_by_itself_is_not_started(
     tmp_path: Path, argv: tuple[str, ...], names: list[str]
 ) -> None:
     drive = replace(SLAM, name="drive", argv=argv)
-    _, (found,) = inspect(tmp_path, drive, GUARD, fence="partition")
-    expect(found, "TF902", "drive", "fence: remap", *names)
-    assert ("/opt/my.xml}" in found.help) is ("/opt/my.xml" in names)
+    _, (finding,) = inspect(tmp_path, drive, GUARD, fence="partition")
+    expect(finding, "TF902", "drive", "fence: remap", *names)
+    assert ("/opt/my.xml}" in finding.help) is ("/opt/my.xml" in names)
     assert inspect(tmp_path, replace(drive, owns=()), GUARD, fence="partition")[1] == [], (
         "who may send no TF at all"
     )
@@ -315,10 +315,10 @@ def test_an_owner_whose_command_names_a_profile_by_itself_is_not_started(
 
 def test_another_rmw_is_fenced_off_by_remapping(tmp_path: Path) -> None:
     static = PlanProcess("static", "static", argv=(PROGRAM, "static", "${plan}", "static"))
-    commands, found = inspect(
+    commands, findings = inspect(
         tmp_path, SLAM, static, GUARD, RMW_IMPLEMENTATION="rmw_cyclonedds_cpp"
     )
-    assert found == []
+    assert findings == []
     for name in ("slam", "static"):
         assert moved(commands[name]) == {
             "/tf": f"/_tfcompose/rover/{name}/tf",
@@ -381,8 +381,8 @@ def test_a_launch_file_is_remapped_in_full(tmp_path: Path) -> None:
     argv = ("${launch:nav/nav.launch.py}", "a:=1")
     nav = PlanProcess("nav", "run", argv=argv, remap={"/scan": "/front/scan"}, owns=(("a", "b"),))
     env = {"PATH": str(tmp_path), "AMENT_PREFIX_PATH": str(tmp_path)}
-    commands, found = inspect(tmp_path, nav, fence="remap", **env)
-    assert found == []
+    commands, findings = inspect(tmp_path, nav, fence="remap", **env)
+    assert findings == []
     given = json.loads(commands["nav"].env[LAUNCH])
     topics = {"/tf": "/_tfcompose/rover/nav/tf", "/tf_static": "/_tfcompose/rover/nav/tf_static"}
     assert given["remap"] == topics | {"/scan": "/front/scan"}
@@ -398,15 +398,15 @@ def test_owners_that_no_remapping_reaches_are_one_finding(tmp_path: Path) -> Non
         owns=(("a", "b"),),
     )
     more = replace(shell, name="more", nodes=("/b",), owns=(("b", "c"),))
-    _, (found,) = inspect(tmp_path, shell, more, SLAM, GUARD, fence="remap")
-    expect(found, "TF902", "shell, more")
+    _, (finding,) = inspect(tmp_path, shell, more, SLAM, GUARD, fence="remap")
+    expect(finding, "TF902", "shell, more")
 
 
 def test_a_command_that_may_be_no_node_gets_no_ros_arguments(tmp_path: Path) -> None:
     web = PlanProcess("web", "run", argv=("true", "--port", "80"), nodes=("/web",))
     play = PlanProcess("play", "run", argv=("true", "--ros-args", "-p", "a:=1"), nodes=("/play",))
-    commands, found = inspect(tmp_path, web, play, SLAM, GUARD, fence="remap")
-    assert found == []
+    commands, findings = inspect(tmp_path, web, play, SLAM, GUARD, fence="remap")
+    assert findings == []
     assert commands["web"].argv[1:] == ("--port", "80")
     assert moved(commands["play"])
 

@@ -120,8 +120,8 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
 
 def late_of(notices: list[Notice]) -> dict[str, Finding]:
     """Return what was shown, by the process that is not ready."""
-    found = [notice.found for notice in notices if isinstance(notice, FindingShown)]
-    return {one.message.split()[0]: one for one in found}
+    findings = [notice.found for notice in notices if isinstance(notice, FindingShown)]
+    return {one.message.split()[0]: one for one in findings}
 
 
 @pytest.mark.usefixtures("domain")

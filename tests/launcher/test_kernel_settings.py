@@ -117,8 +117,8 @@ def commands(folder: Path, process: PlanProcess) -> tuple[dict[str, ChildCommand
 
 
 def answer(folder: Path, process: PlanProcess) -> object:
-    made, found = commands(folder, process)
-    assert found == []
+    made, findings = commands(folder, process)
+    assert findings == []
     child = spawn(made["p"], ())
     output = child.communicate(timeout=30)[0]
     assert child.returncode == 0
@@ -172,8 +172,8 @@ def test_a_process_runs_below_its_prefix(tmp_path: Path) -> None:
 
 def test_what_the_kernel_refuses_is_a_finding_and_nothing_is_started(tmp_path: Path) -> None:
     before = os.sched_getaffinity(0)
-    _, found = commands(tmp_path, replace(PROCESS, schedule=Schedule((4095,))))
-    expect(found[0], "TF911", "p", "CPU 4095")
+    _, findings = commands(tmp_path, replace(PROCESS, schedule=Schedule((4095,))))
+    expect(findings[0], "TF911", "p", "CPU 4095")
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
         (refused,) = check_settings(
             replace(PROCESS, schedule=Schedule((min(before),), "fifo", 80))
@@ -195,8 +195,8 @@ def test_what_asks_the_kernel_keeps_its_own_schedule_without_a_right_to_it(
 
 
 def test_a_prefix_that_is_not_there_is_named(tmp_path: Path) -> None:
-    _, found = commands(tmp_path, replace(PROCESS, prefix=("no_such_runner",)))
-    expect(found[0], "TF810", "no_such_runner")
+    _, findings = commands(tmp_path, replace(PROCESS, prefix=("no_such_runner",)))
+    expect(findings[0], "TF810", "no_such_runner")
 
 
 def test_the_keys_reach_the_plan() -> None:

@@ -60,8 +60,10 @@ def inspect(
     tmp_path: Path, env: dict[str, str], process: PlanProcess = NAV2
 ) -> tuple[dict[str, ChildCommand], Finding | None]:
     plan = Plan("rover", "", None, RosSettings(), (), (process,))
-    commands, found = commands_of(plan, [process], tmp_path / "plan.json", env, child_environment)
-    return commands, found[0] if found else None
+    commands, findings = commands_of(
+        plan, [process], tmp_path / "plan.json", env, child_environment
+    )
+    return commands, findings[0] if findings else None
 
 
 @pytest.mark.parametrize(("own", "namespace"), [(None, "r"), ("r/nav", "r/nav")])
@@ -109,10 +111,13 @@ def test_output_of_nodes_comes_to_the_log_unless_the_user_sends_it_elsewhere(
 
 
 def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]) -> None:
-    _, found = inspect(tmp_path, env | {"PATH": "/nowhere"})
-    assert found
+    _, finding = inspect(tmp_path, env | {"PATH": "/nowhere"})
+    assert finding
     expect(
-        found, "TF810", "ros2 (for launch nav2_bringup/navigation_launch.py) of nav2", "ros2launch"
+        finding,
+        "TF810",
+        "ros2 (for launch nav2_bringup/navigation_launch.py) of nav2",
+        "ros2launch",
     )
 
 
@@ -126,12 +131,12 @@ def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]
 def test_a_launch_file_that_is_not_there_is_named_with_what_is(
     tmp_path: Path, env: dict[str, str], word: str, advice: str
 ) -> None:
-    _, found = inspect(tmp_path, env, PlanProcess("nav2", "run", (f"${{launch:{word}}}",)))
-    assert found
-    expect(found, "TF810", f"{word} of nav2", advice)
+    _, finding = inspect(tmp_path, env, PlanProcess("nav2", "run", (f"${{launch:{word}}}",)))
+    assert finding
+    expect(finding, "TF810", f"{word} of nav2", advice)
 
 
 def test_a_word_that_is_no_argument_is_refused(tmp_path: Path, env: dict[str, str]) -> None:
-    _, found = inspect(tmp_path, env, PlanProcess("nav2", "run", (*NAV2.argv, "--debug")))
-    assert found
-    expect(found, "TF902", "nav2", "--debug")
+    _, finding = inspect(tmp_path, env, PlanProcess("nav2", "run", (*NAV2.argv, "--debug")))
+    assert finding
+    expect(finding, "TF902", "nav2", "--debug")

@@ -147,8 +147,8 @@ def test_after_a_signal_the_exit_code_is_0_and_after_a_time_1_with_the_failure_a
     history = failed().feed(Signalled(SIGINT), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 0
     history = failed().feed(TimeUp(), Exited("static", 0), Exited("guard", 0))
-    (found,) = history.found()
-    assert history.all(Ended) == [Ended(1, (found.message, "camera: no device"))]
+    (finding,) = history.found()
+    assert history.all(Ended) == [Ended(1, (finding.message, "camera: no device"))]
 
 
 def test_when_all_have_ended_the_exit_code_is_1_and_the_first_that_failed_is_named() -> None:

@@ -46,11 +46,11 @@ def test_a_ros_executable_is_found_below_the_prefixes_in_their_order(
     tmp_path: Path, prefix: Path
 ) -> None:
     path = f"{tmp_path}/other:{prefix}"
-    commands, found = inspect(
+    commands, findings = inspect(
         tmp_path, lidar("${executable:sllidar_ros2/sllidar_node}"), env={"AMENT_PREFIX_PATH": path}
     )
     assert commands["lidar"].argv == (f"{prefix}/lib/sllidar_ros2/sllidar_node", "-x")
-    assert found == []
+    assert findings == []
 
 
 def test_a_ros_executable_that_no_prefix_has_is_taken_from_the_path(tmp_path: Path) -> None:
@@ -112,11 +112,11 @@ def test_what_cannot_be_started_is_one_finding_with_its_names(
     process = replace(
         process, argv=tuple(word.replace("PREFIX", str(prefix)) for word in process.argv)
     )
-    _, (found,) = inspect(
+    _, (finding,) = inspect(
         tmp_path, process, STATIC, env={"AMENT_PREFIX_PATH": str(prefix)} if sourced else None
     )
     expect(
-        found,
+        finding,
         code,
         *(name.replace("PREFIX", str(prefix)) if "/" in name else name for name in names),
     )
@@ -130,12 +130,12 @@ def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once
         "slam": "${executable:slam_toolbox/slam}",
         "a": "no_a",
     }
-    _, (found,) = inspect(
+    _, (finding,) = inspect(
         tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items())
     )
     missing = "sllidar_ros2/sllidar_node of laser, slam_toolbox/slam of slam, no_a of a"
     expect(
-        found,
+        finding,
         "TF810",
         "3 executables",
         missing,
@@ -143,15 +143,15 @@ def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once
         "folders of PATH",
         "setup file",
     )
-    assert len(found.notes) == 2
+    assert len(finding.notes) == 2
 
 
 def test_advice_that_programs_share_is_given_once(tmp_path: Path) -> None:
     node = lidar("${executable:nope/no_node}")
     launch = replace(lidar("${launch:nope/no.launch.py}"), name="stack")
-    _, (found,) = inspect(tmp_path, node, launch, env={"PATH": "/nowhere"})
-    assert found.code == "TF810"
-    assert found.help.count("setup file") == 1
+    _, (finding,) = inspect(tmp_path, node, launch, env={"PATH": "/nowhere"})
+    assert finding.code == "TF810"
+    assert finding.help.count("setup file") == 1
 
 
 def test_a_relative_program_is_found_in_the_processs_folder(tmp_path: Path, prefix: Path) -> None:
@@ -165,11 +165,11 @@ def test_a_folder_that_is_not_there_is_found_before_anything_is_started(
     tmp_path: Path, cwd: str
 ) -> None:
     process = PlanProcess("lidar", "run", argv=("true",), cwd=cwd)
-    _, (found,) = inspect(tmp_path, process)
+    _, (finding,) = inspect(tmp_path, process)
     folder = os.path.normpath(tmp_path / cwd.replace("${build_dir}/", ""))
-    expect(found, "TF810", folder, "lidar")
+    expect(finding, "TF810", folder, "lidar")
     commands, found_of_optional = inspect(tmp_path, replace(process, required=False))
-    assert (commands["lidar"].missing, found_of_optional) == (found.message, [])
+    assert (commands["lidar"].missing, found_of_optional) == (finding.message, [])
 
 
 def test_sharing_with_a_fleet_needs_zenoh_before_anything_is_started(
@@ -180,8 +180,8 @@ def test_sharing_with_a_fleet_needs_zenoh_before_anything_is_started(
     )
     own = replace(share, name="own", argv=("sh", "-c", "tfcompose fleet share"))
     monkeypatch.setattr("tfcompose.tools.fleet.preflight.find_spec", lambda _: None)
-    _, (found,) = inspect(tmp_path, share, own)
-    expect(found, "TF920", "fleet_share", "tfcompose[fleet]")
+    _, (finding,) = inspect(tmp_path, share, own)
+    expect(finding, "TF920", "fleet_share", "tfcompose[fleet]")
 
 
 def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:
@@ -195,8 +195,8 @@ def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:
 def test_processes_that_wait_for_each_other_are_a_finding(tmp_path: Path) -> None:
     a = PlanProcess("a", "run", argv=("true",), after={"b": "started"})
     b = PlanProcess("b", "run", argv=("true",), after={"a": "started"})
-    _, (found,) = inspect(tmp_path, a, b, lidar("true"))
-    expect(found, "TF812", "a, b ")
+    _, (finding,) = inspect(tmp_path, a, b, lidar("true"))
+    expect(finding, "TF812", "a, b ")
 
 
 def test_a_guard_is_started_first_whatever_it_is_declared_to_wait_for(tmp_path: Path) -> None:

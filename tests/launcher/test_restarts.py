@@ -87,8 +87,8 @@ def test_a_gate_that_stays_shut_is_reported_once_and_may_still_open() -> None:
         Clear(), GateState("lidar", "topics /tf, /scan_raw", is_open=False)
     )
     assert history.sleep_until_due() == pytest.approx(3)
-    (found,) = history.late
-    expect(found, "TF817", "lidar", " 3 s", "/scan", "topics /tf, /scan_raw")
+    (finding,) = history.late
+    expect(finding, "TF817", "lidar", " 3 s", "/scan", "topics /tf, /scan_raw")
     assert len(history.wait(60).late) == 1
     assert history.started == ["guard", "lidar"]
     history.feed(GateState("lidar", "/scan", is_open=True))
@@ -383,7 +383,7 @@ def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
         history.feed(Exited("guard", 1)).sleep_until_due()
     history.feed(Exited("guard", 1))
     expect(history.found()[-1], "TF808", "guard", "exit code 1", " 5 restarts")
-    assert [found.severity for found in history.found()] == ["warning"] * 5 + ["error"]
+    assert [finding.severity for finding in history.found()] == ["warning"] * 5 + ["error"]
     assert history.feed(Exited("static", 0)).exit_code == 1
 
 

@@ -25,7 +25,7 @@ from tfcompose.model.plan.file import write_plan
 
 
 @pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RuntimeDir:
+def rover_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RuntimeDir:
     """The directory of a run that has not begun, below a user's folder."""
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
@@ -33,14 +33,14 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RuntimeDir:
 
 
 @pytest.fixture
-def files(place: RuntimeDir) -> Iterator[RunFiles]:
+def files(rover_dir: RuntimeDir) -> Iterator[RunFiles]:
     """The files of a run, with a plan and a description."""
-    lock = Lock(place)
-    plan_file = place.plan_folder("1") / "plan.json"
+    lock = Lock(rover_dir)
+    plan_file = rover_dir.plan_folder("1") / "plan.json"
     (plan_file.parent / "arm").mkdir(parents=True)
     plan_file.write_bytes(b"the plan")
     (plan_file.parent / "arm" / "robot.urdf").write_bytes(b"the arm")
-    files = RunFiles(place, lock, plan_file)
+    files = RunFiles(rover_dir, lock, plan_file)
     yield files
     files.listener.close()
     lock.close()
@@ -55,15 +55,15 @@ def restored(files: RunFiles) -> bool:
     return is_restored
 
 
-def are_complete(files: RunFiles, place: RuntimeDir) -> bool:
+def are_complete(files: RunFiles, runtime_dir: RuntimeDir) -> bool:
     """Return whether commands find the run there: its holder, its socket, and the plan."""
-    holder = place.holder()
-    connect(place).close()
+    holder = runtime_dir.holder()
+    connect(runtime_dir).close()
     folder = files.plan_file.parent
     return (
         holder is not None
         and (holder.pid, holder.run) == (os.getpid(), files.run_id)
-        and files.plan_file.is_relative_to(place.folder)
+        and files.plan_file.is_relative_to(runtime_dir.folder)
         and files.plan_file.read_bytes() == b"the plan"
         and (folder / "arm" / "robot.urdf").read_bytes() == b"the arm"
     )
@@ -77,22 +77,22 @@ REMOVED = ["user", "user/tfcompose", "user/tfcompose/rover@0"] + [
 
 @pytest.mark.parametrize("name", REMOVED)
 def test_what_is_removed_comes_back(
-    name: str, files: RunFiles, place: RuntimeDir, tmp_path: Path
+    name: str, files: RunFiles, rover_dir: RuntimeDir, tmp_path: Path
 ) -> None:
-    before = place.holder()
+    before = rover_dir.holder()
     assert not restored(files)
     path = tmp_path / name
     shutil.rmtree(path) if path.is_dir() else path.unlink()
     assert restored(files)
-    assert are_complete(files, place)
-    assert place.holder() == before
+    assert are_complete(files, rover_dir)
+    assert rover_dir.holder() == before
     assert not restored(files)
     if path.is_dir():
         assert path.stat().st_mode & 0o077 == 0
 
 
 def test_files_are_elsewhere_until_their_folder_can_be_made(
-    files: RunFiles, place: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: RunFiles, rover_dir: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Only the system makes ``/run/user/UID``; commands without one look where the files are."""
     monkeypatch.setattr(runtime_dir, "USERS", tmp_path)
@@ -109,7 +109,7 @@ def test_files_are_elsewhere_until_their_folder_can_be_made(
     assert are_complete(files, elsewhere)
     (tmp_path / "user").mkdir(mode=0o700)
     assert restored(files)
-    assert are_complete(files, place)
+    assert are_complete(files, rover_dir)
     assert not elsewhere.folder.exists()
 
 
@@ -125,15 +125,15 @@ def test_a_folder_that_another_user_can_open_is_not_used(
         restored(files)
 
 
-def test_another_plan_is_kept_from_then_on(files: RunFiles, place: RuntimeDir) -> None:
-    other = place.plan_folder("2") / "plan.json"
+def test_another_plan_is_kept_from_then_on(files: RunFiles, rover_dir: RuntimeDir) -> None:
+    other = rover_dir.plan_folder("2") / "plan.json"
     other.parent.mkdir()
     other.write_bytes(b"another plan")
     files.keep(other)
-    shutil.rmtree(place.folder)
+    shutil.rmtree(rover_dir.folder)
     assert restored(files)
     assert other.read_bytes() == b"another plan"
-    assert place.plan_folders() == [other.parent]
+    assert rover_dir.plan_folders() == [other.parent]
 
 
 @pytest.mark.parametrize(
@@ -157,8 +157,8 @@ def test_a_folder_goes_with_the_logout_of_a_user_who_does_not_linger(
     if "lingers" in facts:
         (tmp_path / "LINGERING" / user_name()).touch()
     above = tmp_path / ("USERS" if "below" in facts else "elsewhere")
-    place = RuntimeDir("rover@0", above / number / "tfcompose" / "rover@0", tmp_path)
-    assert goes_with_logout(place) is expected
+    rover = RuntimeDir("rover@0", above / number / "tfcompose" / "rover@0", tmp_path)
+    assert goes_with_logout(rover) is expected
 
 
 LAUNCHER = """
@@ -183,18 +183,18 @@ READER = "import sys, time; print(len(open(sys.argv[1]).read()), flush=True); ti
 
 def test_a_robot_whose_folder_was_removed_is_found_steered_and_repaired(tmp_path: Path) -> None:
     name = f"rover{os.getpid()}@0"
-    place = RuntimeDir(name, tmp_path / "user" / "tfcompose" / name, tmp_path)
+    runtime_dir = RuntimeDir(name, tmp_path / "user" / "tfcompose" / name, tmp_path)
     argv = (sys.executable, "-I", "-S", "-c", READER, "${plan}")
     reader = PlanProcess("reader", "run", argv, restart="on-failure", restart_delay=0.01)
-    file = place.plan_folder("1") / "plan.json"
+    file = runtime_dir.plan_folder("1") / "plan.json"
     file.parent.mkdir(parents=True)
     file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), (reader,))))
-    command = [sys.executable, "-c", LAUNCHER, name, str(place.folder), str(file)]
+    command = [sys.executable, "-c", LAUNCHER, name, str(runtime_dir.folder), str(file)]
     launcher = processes.start(command)
 
     def pid_of_reader() -> int | None:
         try:
-            (process,) = ask(place, StatusRequest(), RobotStatus).processes
+            (process,) = ask(runtime_dir, StatusRequest(), RobotStatus).processes
         except OSError:
             return None
         return process.pid if process.state == "running" else None
@@ -211,11 +211,11 @@ def test_a_robot_whose_folder_was_removed_is_found_steered_and_repaired(tmp_path
             os.kill(before, signal.SIGKILL)
             known = {None, before}
             assert until(partial(is_another, known))
-            assert ask(place, StatusRequest(), RobotStatus).processes[0].restarts <= 2
+            assert ask(runtime_dir, StatusRequest(), RobotStatus).processes[0].restarts <= 2
         shutil.rmtree(tmp_path / "user")
         assert until(partial(is_another, {None})), "without the start of a process, too"
         assert FILES_CHECK_S < 1
-        assert ask(place, DownRequest(), Done).ok
+        assert ask(runtime_dir, DownRequest(), Done).ok
         assert launcher.wait(TIMEOUT_S) == 0
     finally:
         processes.end(launcher)

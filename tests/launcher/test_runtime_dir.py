@@ -50,10 +50,13 @@ def env(tmp_path: Path) -> dict[str, str]:
 def test_a_robot_is_its_name_in_its_domain_which_is_the_plans_or_else_the_environments(
     env: dict[str, str],
 ) -> None:
-    place = runtime_dir_of(ROVER, env)
-    assert (place.name, place.folder.parent.stat().st_mode & 0o777) == ("rover@7", 0o700)
-    assert place.logs == runtime_dir_of(ROVER, env).logs
-    assert str(place.logs) == f"{env['ROS_LOG_DIR']}/tfcompose/rover@7"
+    runtime_dir = runtime_dir_of(ROVER, env)
+    assert (runtime_dir.name, runtime_dir.folder.parent.stat().st_mode & 0o777) == (
+        "rover@7",
+        0o700,
+    )
+    assert runtime_dir.logs == runtime_dir_of(ROVER, env).logs
+    assert str(runtime_dir.logs) == f"{env['ROS_LOG_DIR']}/tfcompose/rover@7"
     assert runtime_dir_of(Plan("rover", "", None, RosSettings(), (), ()), env).name == "rover@3"
     assert (
         runtime_dir_of(
@@ -71,11 +74,11 @@ def test_without_a_safe_runtime_folder_one_of_the_users_own_is_made(
     (tmp_path / "shared").chmod(0o777)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(runtime_dir, "USERS", tmp_path / "nobody")
-    place = runtime_dir_of(
+    rover = runtime_dir_of(
         ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / given) if given == "shared" else given}
     )
-    assert place.folder.parent == tmp_path / f"tfcompose-{os.getuid()}"
-    assert place.folder.parent.stat().st_mode & 0o777 == 0o700
+    assert rover.folder.parent == tmp_path / f"tfcompose-{os.getuid()}"
+    assert rover.folder.parent.stat().st_mode & 0o777 == 0o700
 
 
 def test_who_does_not_name_the_users_folder_uses_it_too(
@@ -109,20 +112,20 @@ def test_a_folder_that_somebody_else_may_have_prepared_is_refused(
 def test_one_of_two_gets_the_lock_and_a_killed_holder_leaves_nothing(
     env: dict[str, str],
 ) -> None:
-    place = runtime_dir_of(ROVER, env)
-    command = [sys.executable, "-c", HOLD, str(place.folder)]
+    runtime_dir = runtime_dir_of(ROVER, env)
+    command = [sys.executable, "-c", HOLD, str(runtime_dir.folder)]
     with processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout
         run = other.stdout.readline().strip()
         with pytest.raises(BlockingIOError):
-            Lock(place)
-        holder = place.holder()
+            Lock(runtime_dir)
+        holder = runtime_dir.holder()
         assert holder
         assert (holder.pid, holder.run) == (other.pid, run)
         assert [one.name for one in runtime_dirs(env)] == ["rover@7"]
         other.kill()
-    assert place.holder() is None
-    lock = Lock(place)
+    assert runtime_dir.holder() is None
+    lock = Lock(runtime_dir)
     assert lock.run != run
     lock.close()
 
@@ -130,28 +133,28 @@ def test_one_of_two_gets_the_lock_and_a_killed_holder_leaves_nothing(
 def test_who_only_observes_is_in_nobodys_way_and_is_taken_for_nobodys_run(
     env: dict[str, str],
 ) -> None:
-    place = runtime_dir_of(ROVER, env)
-    Lock(place).close()
-    with (place.folder / "lock").open() as looker:
+    runtime_dir = runtime_dir_of(ROVER, env)
+    Lock(runtime_dir).close()
+    with (runtime_dir.folder / "lock").open() as looker:
         fcntl.flock(
             looker, fcntl.LOCK_SH
         )  # as holder does for a moment; this one is kept from going on
-        assert place.holder() is None, "of two who look, each took the other for a run"
+        assert runtime_dir.holder() is None, "of two who look, each took the other for a run"
         threading.Timer(0.2, fcntl.flock, (looker, fcntl.LOCK_UN)).start()
-        lock = Lock(place)
-    assert place.holder()
+        lock = Lock(runtime_dir)
+    assert runtime_dir.holder()
     lock.close()
 
 
 def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str]) -> None:
-    place = runtime_dir_of(ROVER, env)
-    lock = Lock(place)
+    runtime_dir = runtime_dir_of(ROVER, env)
+    lock = Lock(runtime_dir)
     with processes.start(["/bin/sleep", "60"], close_fds=False) as child:
         lock.close()
         try:
             # The kernel gives the parent its turn a moment before it closes what the child must
             # not have.
-            assert until(lambda: place.holder() is None)
+            assert until(lambda: runtime_dir.holder() is None)
         finally:
             child.kill()
 

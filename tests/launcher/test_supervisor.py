@@ -165,11 +165,11 @@ def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(
 ) -> None:
     failing = "import sys; [print(i) for i in range(20)]; sys.exit('no lidar at /dev/ttyUSB0')"
     code, notices = run(tmp_path, program("lidar", failing), program("b", SLEEPER))
-    (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
+    (finding,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert code == 1
-    expect(found, "TF808", "lidar", "exit code 1", "lidar: no lidar at /dev/ttyUSB0")
-    assert len(found.notes) == 8
-    assert notices[-1] == Ended(1, (found.message, *(note.message for note in found.notes)))
+    expect(finding, "TF808", "lidar", "exit code 1", "lidar: no lidar at /dev/ttyUSB0")
+    assert len(finding.notes) == 8
+    assert notices[-1] == Ended(1, (finding.message, *(note.message for note in finding.notes)))
 
 
 def test_a_finding_needs_no_file_once_the_plan_runs(
@@ -257,9 +257,9 @@ def test_what_cannot_be_executed_is_named_and_everything_ends_with_1(tmp_path: P
     code, notices = run(
         tmp_path, program("b", SLEEPER), PlanProcess("a", "run", argv=(str(broken),))
     )
-    (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
+    (finding,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert code == 1
-    expect(found, "TF808", "a ", "Exec format error", str(broken))
+    expect(finding, "TF808", "a ", "Exec format error", str(broken))
     assert [
         notice.state
         for notice in notices
@@ -277,17 +277,17 @@ def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(
     lasting = program("lasting", "import time; time.sleep(0.3); print('to the end')")
     code, notices = run(tmp_path, absent, failing, lasting)
     assert (code, logged(notices, "lasting")) == (1, ["to the end"])
-    found = [notice.found for notice in notices if isinstance(notice, FindingShown)]
-    assert [one.severity for one in found] == ["warning", "warning"]
-    expect(found[0], found[0].code, "no_package/no_program", "absent")
-    expect(found[1], "TF808", "failing", "exit code 3")
+    findings = [notice.found for notice in notices if isinstance(notice, FindingShown)]
+    assert [one.severity for one in findings] == ["warning", "warning"]
+    expect(findings[0], findings[0].code, "no_package/no_program", "absent")
+    expect(findings[1], "TF808", "failing", "exit code 3")
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     code, notices = run(tmp_path, program("a", SLEEPER, cwd="maps"))
-    (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
+    (finding,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert code == 1
-    expect(found, "TF810", f"{tmp_path}/maps", "a ")
+    expect(finding, "TF810", f"{tmp_path}/maps", "a ")
 
 
 def test_missing_executables_are_all_reported_before_anything_is_started(tmp_path: Path) -> None:

@@ -52,8 +52,8 @@ def test_every_message_is_read_as_it_was_encoded(data: st.DataObject) -> None:
 
 
 def test_a_notice_says_when_behind_its_name() -> None:
-    found = Finding("TF808", "process_failed", "error", "lidar ended", None, (Note("why"),))
-    notice = ipc.FindingShown(found)
+    finding = Finding("TF808", "process_failed", "error", "lidar ended", None, (Note("why"),))
+    notice = ipc.FindingShown(finding)
     line = notice_line(notice, 12.34567)
     assert list(json.loads(line)) == ["event", "at", "found"]
     assert read_notice(line.encode()) == (notice, 12.346)

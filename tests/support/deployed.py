@@ -74,7 +74,7 @@ class StandInHost:
     name: str
     answers: dict[str, Any] = field(default_factory=dict)
     offset_s: float = 0.0
-    at: None = None
+    span: None = None
     requests: list[str] = field(default_factory=list)
 
     async def ask(self, request: str, timeout_s: float = 1.0, **_: Any) -> Any:

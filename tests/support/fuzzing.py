@@ -116,14 +116,14 @@ def mutated(data: bytes, others: list[bytes], rng: random.Random) -> bytes:
     return data[:LONGEST]
 
 
-def _shown(found: list[Finding]) -> None:
+def _shown(findings: list[Finding]) -> None:
     """Render findings in each form; each says where and what in text that a terminal can take."""
-    assert not [one for one in found if one.code == "TF903"], found
+    assert not [one for one in findings if one.code == "TF903"], findings
     for text in (
-        render_text(found, lambda *_: None, colour=False),
-        render_json(found),
-        render_github(found),
-        render_sarif(found, "0"),
+        render_text(findings, lambda *_: None, colour=False),
+        render_json(findings),
+        render_github(findings),
+        render_sarif(findings, "0"),
     ):
         text.encode()
         assert not {"\x1b", "\x00", "\x9b"} & set(text), ascii(text)
@@ -136,7 +136,7 @@ def _compiled(file: Path) -> None:
     except RejectedError as error:
         _shown(list(error.findings))
         return
-    _shown(list(compiled.found))
+    _shown(list(compiled.findings))
     assert compiled.robot or compiled.errors
     if compiled.robot and not compiled.errors:
         for one in emit(compiled.robot):
@@ -168,7 +168,7 @@ def params(data: bytes, folder: Path) -> None:
     file = folder / "nav.yaml"
     file.write_bytes(data)
     try:
-        _shown(load_params(read_text(str(file)), str(file)).found)
+        _shown(load_params(read_text(str(file)), str(file)).findings)
     except RejectedError as error:
         _shown(list(error.findings))
 

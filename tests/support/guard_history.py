@@ -183,7 +183,7 @@ class History:
         message = Message(pairs, kind, gid, sent_ns, publisher.sent, stamps, self.wall_ns())
         judged = self.judge.take(message, self.now)
         self.admitted = judged.admitted
-        self.events += self.judge.arrived(judged, message, self.now)
+        self.events += self.judge.judge_arrival(judged, message, self.now)
         return self
 
     def check(self) -> History:
@@ -252,8 +252,8 @@ class History:
 
     def only(self) -> Finding:
         """Return what was found, which is one thing."""
-        (found,) = self.found()
-        return found
+        (finding,) = self.found()
+        return finding
 
     def all(self, kind: type[GuardEvent]) -> list[GuardEvent]:
         return [event for event in self.events if isinstance(event, kind)]

@@ -16,7 +16,7 @@ PRESETS = library()
 
 def built(file: Path) -> str:
     compiled = compile_robot(read_text(str(file)), str(file), PRESETS, read=read_text, disk=disk())
-    assert compiled.robot, compiled.found
+    assert compiled.robot, compiled.findings
     assert not compiled.errors, [str(one) for one in compiled.errors][:3]
     files = {one.path: one.text for one in emit(compiled.robot, Target(folder=str(file.parent)))}
     return files["robot.urdf"]

@@ -107,8 +107,8 @@ class History:
                 self.requested.append(order)
             case Order(order):
                 self.orders.append(order)
-            case NotifyLate(_, found):
-                self.late.append(found)
+            case NotifyLate(_, finding):
+                self.late.append(finding)
             case Finish(code):
                 self.exit_code = code
 
@@ -148,8 +148,8 @@ class History:
 
     def only(self) -> Finding:
         """Return what was shown, which is one finding."""
-        (found,) = self.found()
-        return found
+        (finding,) = self.found()
+        return finding
 
     def states(self, name: str) -> list[str]:
         return [notice.state for notice in self.all(ProcessState) if notice.process == name]

@@ -16,7 +16,7 @@ from tfcompose.cli.documentation import TOPICS
 from tfcompose.cli.parser import COMMANDS
 from tfcompose.cli.schemas import LANGUAGES
 from tfcompose.foundation.catalogue import CATALOGUE
-from tfcompose.foundation.tool import shipped
+from tfcompose.foundation.tool import shipped_tools
 from tfcompose.launcher.program import PROCESSES
 from tfcompose.spec.language.robot import RobotSpec
 
@@ -36,7 +36,7 @@ def names() -> str:
             },
         }
     }
-    for tool in shipped().tools:
+    for tool in shipped_tools().tools:
         kinds: dict[str, list[str]] = {}
         for kind, name in tool.names():
             kinds.setdefault(kind, []).append(name)

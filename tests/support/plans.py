@@ -10,8 +10,8 @@ from tfcompose.model.plan.file import read_plan
 def built(text: str, *profiles: str) -> dict[str, str]:
     """Return the files that a right robot is built to."""
     compiled = compile_robot(text, "robot.yaml", library(), list(profiles))
-    assert compiled.robot, compiled.found
-    assert not compiled.errors, compiled.found
+    assert compiled.robot, compiled.findings
+    assert not compiled.errors, compiled.findings
     return {file.path: file.text for file in emit(compiled.robot)}
 
 

@@ -88,10 +88,12 @@ def _serve() -> None:
 
     for module in MODULES:
         import_module(module)
-    from tfcompose.foundation.tool import installed  # noqa: PLC0415 (the same)
+    from tfcompose.foundation.tool import installed_tools  # noqa: PLC0415 (the same)
 
     for line in sys.stdin:
-        assert not installed.cache_info().currsize, "a module looks for tools where it is loaded"
+        assert not installed_tools.cache_info().currsize, (
+            "a module looks for tools where it is loaded"
+        )
         request = json.loads(line)
         pid = os.fork()
         if not pid:

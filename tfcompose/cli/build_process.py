@@ -108,9 +108,9 @@ def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
         from tfcompose.cli.plans import PLAN
         from tfcompose.cli.writing import build
 
-        folder, _, found = build(arguments)
+        folder, _, findings = build(arguments)
         with open(answer, "wb", closefd=False) as pipe:
-            pipe.write(os.fsencode(folder / PLAN) + b"\0" + msgspec.json.encode(found))
+            pipe.write(os.fsencode(folder / PLAN) + b"\0" + msgspec.json.encode(findings))
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else UNREADABLE

@@ -174,10 +174,10 @@ def compile_or_exit(file: str, arguments: Namespace) -> Robot:
     Raises:
         SystemExit: after printing what is wrong with it.
     """
-    return compiled_without_errors(file, arguments)[0]
+    return compile_without_errors(file, arguments)[0]
 
 
-def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Compiled]:
+def compile_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Compiled]:
     """Return the robot and its compiled files; print warnings.
 
     Raises:
@@ -198,8 +198,8 @@ def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Com
     except RejectedError as error:
         reject(error.findings)
     if compiled.robot is None or compiled.errors:
-        reject(compiled.found)
-    print_findings(compiled.found, sys.stderr, most=MOST_OF_ONE_CODE)
+        reject(compiled.findings)
+    print_findings(compiled.findings, sys.stderr, most=MOST_OF_ONE_CODE)
     return compiled.robot, compiled
 
 

@@ -184,7 +184,7 @@ def _robots(_: Sequence[str]) -> list[str]:
     from tfcompose.launcher.runtime_dir import RuntimeDirError
 
     try:
-        return [place.name for place, _holder in running()]
+        return [runtime_dir.name for runtime_dir, _holder in running()]
     except RuntimeDirError:
         return []
 

@@ -20,7 +20,7 @@ from tfcompose.compiler.render.text import (
     no_address,
     render_text,
 )
-from tfcompose.foundation.text import listed, plural
+from tfcompose.foundation.text import list_names, plural
 from tfcompose.model.messages import (
     AllReady,
     AllStarted,
@@ -229,7 +229,7 @@ class Console:
         changes = describe_changes(notice, ("changed", "new", "gone", "new description"))
         self._say(f"another plan: {changes or 'nothing to restart'}")
         if notice.held:
-            self._say(self._paint(describe_vanished(notice.held), YELLOW))
+            self._say(self._paint(describe_vanished_edges(notice.held), YELLOW))
 
     @_write.register
     def _(self, notice: TreeComplete) -> None:
@@ -244,7 +244,7 @@ class Console:
     @_write.register
     def _(self, notice: Waiting) -> None:
         for owner in notice.missing:
-            edges = listed(owner.edges, NAMED_AT_MOST)
+            edges = list_names(owner.edges, NAMED_AT_MOST)
             self._say(self._paint(f"waiting for {owner.owner} ({owner.node}): {edges}", YELLOW))
 
     @_write.register
@@ -311,7 +311,7 @@ class Console:
     ) -> None:
         """Write a line; keep only colours of lines from other programs."""
         fault = self._kept(name, text) if keep else None
-        clear = self._status.cleared() if self._status else ""
+        clear = self._status.clear() if self._status else ""
         shown = text
         if not is_rendered:
             shown = keep_colours(text) if self._colour else plain(text)
@@ -343,9 +343,9 @@ def describe_changes(change: PlanChange | Replanned, labels: Sequence[str]) -> s
     )
 
 
-def describe_vanished(edges: tuple[str, ...]) -> str:
+def describe_vanished_edges(edges: tuple[str, ...]) -> str:
     """Return the warning about fixed edges that vanished."""
-    named = listed(edges, NAMED_AT_MOST)
+    named = list_names(edges, NAMED_AT_MOST)
     return (
         f"running listeners keep {named}: tf2 never forgets a fixed frame; restart RViz and other"
         " listeners"
@@ -405,7 +405,7 @@ class StatusLine:
         elif isinstance(notice, Ended):
             self._ended = True
 
-    def cleared(self) -> str:
+    def clear(self) -> str:
         """Return the control sequence that clears the line."""
         self._shown = ""
         return CLEAR_LINE if self._drawn else ""
@@ -461,10 +461,10 @@ class StatusLine:
             alive = [
                 name for name, state in self._states.items() if state in ("running", "stopping")
             ]
-            return f"stopping {listed(alive, STATUS_NAMED_AT_MOST)}" if alive else "stopping"
+            return f"stopping {list_names(alive, STATUS_NAMED_AT_MOST)}" if alive else "stopping"
         waits = [name for name, owned in self._owned.items() if owned and name not in self._live]
         return (
-            f"waiting for {listed(waits, STATUS_NAMED_AT_MOST)}"
+            f"waiting for {list_names(waits, STATUS_NAMED_AT_MOST)}"
             if waits and not self._ready
             else ""
         )

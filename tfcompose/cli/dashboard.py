@@ -192,8 +192,8 @@ class Dashboard:
             (self._began, f"WARNING {plain(warning)}") for warning in self.warnings
         )
         self._counts = dict.fromkeys(self._counts, 0)
-        for found in self.built_with:
-            self.take(FindingShown(found), self._began)
+        for finding in self.built_with:
+            self.take(FindingShown(finding), self._began)
 
     def add_log_lines(self, lines: Iterable[str]) -> None:
         """Add lines to the log; keep the position if it is scrolled back."""
@@ -393,8 +393,8 @@ class Dashboard:
     def _news(self) -> list[Text]:
         """Return the first line of each report, or the launcher's lines if there is none."""
         if self._reports:
-            return [self._timed(report.at, report.lines[0]) for report in self._reports]
-        return [self._timed(at, _style_line(line)) for at, line in self._events]
+            return [self._with_time(report.at, report.lines[0]) for report in self._reports]
+        return [self._with_time(at, _style_line(line)) for at, line in self._events]
 
     def _log_page(self, columns: int, rows: int) -> list[Text]:
         scroll = self._scroll("log")
@@ -443,7 +443,7 @@ class Dashboard:
         lines: list[Text] = []
         for report in self._reports:
             first, *rest = report.lines
-            for line in (self._timed(report.at, first), *rest):
+            for line in (self._with_time(report.at, first), *rest):
                 pieces = line.divide([len(piece) for piece in _ends(line.plain, columns - 1)])
                 lines += [Text(" ").append_text(piece) for piece in pieces if piece.plain]
         return lines[self._scroll("findings").window(len(lines), rows)]
@@ -454,7 +454,7 @@ class Dashboard:
         lines = [Text(f" {line}", style=styles.get(line, "")) for line in HELP.splitlines()]
         return lines[self._scroll("help").window(len(lines), rows)]
 
-    def _timed(self, at: float, line: Text) -> Text:
+    def _with_time(self, at: float, line: Text) -> Text:
         today = time.localtime(self.clock())[:3] == time.localtime(at)[:3]
         stamp = time.strftime("%H:%M:%S" if today else "%b %d %H:%M", time.localtime(at))
         return Text(f"{stamp} ", style="dim").append_text(line)

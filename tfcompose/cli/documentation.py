@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.command_parser import command_parser
 from tfcompose.cli.tool_commands import ToolCommand, add_all_options
-from tfcompose.foundation.tool import installed
+from tfcompose.foundation.tool import installed_tools
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -57,7 +57,7 @@ _COMMENT = re.compile(r"^<!--.*?-->\n*", re.DOTALL | re.MULTILINE)
 
 def topics() -> dict[str, str]:
     """Return the topics of the core and of installed tools, with their subjects."""
-    of_tools = installed().topics()
+    of_tools = installed_tools().topics()
     return TOPICS | {name: topic.about for name, (_, topic) in of_tools.items()}
 
 
@@ -65,7 +65,7 @@ def topic_groups() -> dict[str, dict[str, str]]:
     """Return the topics of the core and of installed tools by their groups."""
     groups = {title: dict(names) for title, names in TOPIC_GROUPS.items()}
     reference = groups.popitem()
-    for name, (_, topic) in installed().topics().items():
+    for name, (_, topic) in installed_tools().topics().items():
         groups.setdefault(topic.group, {})[name] = topic.about
     return groups | dict([reference])
 
@@ -118,7 +118,7 @@ def topic(name: str, *, with_reference: bool = True) -> str:
 
     Without the reference, it omits all keys and all codes.
     """
-    tool, _ = installed().topics().get(name, (None, None))
+    tool, _ = installed_tools().topics().get(name, (None, None))
     text = _read(name, FOLDER if tool is None else tool.topic_folder)
     more = _GENERATED.get(name) or (with_reference and _REFERENCES.get(name))
     return f"{text}\n{more()}" if more else text

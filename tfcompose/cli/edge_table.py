@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.cli.tables import Table
 from tfcompose.cli.terminal import printable
 from tfcompose.compiler.render.text import YELLOW
-from tfcompose.foundation.text import listed, plural
+from tfcompose.foundation.text import list_names, plural
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,7 +73,7 @@ def not_kept(observer: TreeObserver) -> str:
     nodes = {
         node for gid in observer.beyond for node in observer.publishers.nodes(gid, static=False)
     }
-    by = f" from {printable(listed(sorted(nodes)))}" if nodes else ""
+    by = f" from {printable(list_names(sorted(nodes)))}" if nodes else ""
     return f"{plural(sum(observer.beyond.values()), 'transform')} of further edges{by} not kept"
 
 

@@ -53,11 +53,11 @@ class Fixer:
 
     def fix(self, file: str) -> list[Finding]:
         """Fix one file in memory and return the findings that remain."""
-        found = self._findings([file])
+        findings = self._findings([file])
         while True:
             todo = [
                 finding
-                for finding in found
+                for finding in findings
                 if finding.edits and all(self._may_edit(edit.span.file) for edit in finding.edits)
             ]
             kept = self._sound(file, [], todo)
@@ -65,7 +65,7 @@ class Fixer:
                 return self.lint(file, self.read)
             self.texts |= self._apply_edits(kept) or {}
             self.fixed += kept
-            found = self._findings([file])
+            findings = self._findings([file])
 
     def write(self) -> None:
         """Write the files that changed.
@@ -145,8 +145,8 @@ def _path(file: str) -> str:
     return str(Path(file).resolve())
 
 
-def _count_findings(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
-    return Counter((finding.code, finding.message) for finding in found)
+def _count_findings(findings: Iterable[Finding]) -> Counter[tuple[str, str]]:
+    return Counter((finding.code, finding.message) for finding in findings)
 
 
 def rewrite(path: Path, old: str, new: str) -> None:

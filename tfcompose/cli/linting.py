@@ -125,7 +125,7 @@ class _Variants:
         """Return findings and compiled robots for each combination of argument values."""
         if not self.source.has(("args",)) and not self.overlays:
             alone = self._compile(self.given, profiles)
-            return list(alone.found), [alone]
+            return list(alone.findings), [alone]
         from tfcompose.foundation.findings import RejectedError, Span
         from tfcompose.spec.language import GivenArg, compose
         from tfcompose.spec.language.arguments import alternatives_of, combinations
@@ -149,7 +149,7 @@ class _Variants:
             for name, value in values.items():
                 args[name] = GivenArg(value, Span(f"{name}:={value}"))
             judged.append((values, self._compile(replace(self.given, args=args), profiles)))
-        findings = merge_findings([(values, compiled.found) for values, compiled in judged])
+        findings = merge_findings([(values, compiled.findings) for values, compiled in judged])
         return findings, [compiled for _, compiled in judged]
 
     def with_each_profile(
@@ -172,7 +172,7 @@ class _Variants:
             note = Note(f"with --profile {profile}")
             new = [
                 finding
-                for finding in variant.found
+                for finding in variant.findings
                 if _identity(finding) not in known and _judgement(finding) not in messages
             ]
             more += [replace(finding, notes=(*finding.notes, note)) for finding in new]

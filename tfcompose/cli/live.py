@@ -47,9 +47,7 @@ def refuse_live_bag(arguments: Namespace) -> None:
         fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
 
 
-def observed_for(
-    name: str, arguments: Namespace
-) -> tuple[Plan | None, dict[Topics, TreeObserver]]:
+def observe_for(name: str, arguments: Namespace) -> tuple[Plan | None, dict[Topics, TreeObserver]]:
     """Return the plan of FILE, if given, and the observation of the topics (moving, fixed).
 
     On its own, or --namespace's. ``name`` is that of the node that observes.
@@ -63,7 +61,7 @@ def observed_for(
     pairs = list(parts_of(plan)) if plan else []
     pairs = pairs or [topics_below(ros.namespace if ros else arguments.namespace)]
     duration_s = arguments.duration
-    return plan, observed(name, pairs, bag=arguments.bag, ros=ros, duration_s=duration_s)
+    return plan, observe_topics(name, pairs, bag=arguments.bag, ros=ros, duration_s=duration_s)
 
 
 def from_bag(read: Callable[[], T]) -> T:
@@ -82,7 +80,7 @@ def from_bag(read: Callable[[], T]) -> T:
         reject([finding("TF907", str(error), None, help=error.help)], UNREADABLE)
 
 
-def observed(  # noqa: PLR0913 (all but two are named)
+def observe_topics(  # noqa: PLR0913 (all but two are named)
     name: str,
     pairs: Iterable[Topics],
     *,

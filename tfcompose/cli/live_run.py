@@ -74,7 +74,7 @@ def can_show_live() -> bool:
 
 
 def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
-    place: RuntimeDir,
+    runtime_dir: RuntimeDir,
     plan: Plan,
     launcher: int,
     mask: Iterable[int],
@@ -95,7 +95,7 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
         from tfcompose.cli.screen import Screen
 
         view = _LiveView(
-            place, Dashboard(place.name, plan, built_with, warnings), launcher, signals
+            runtime_dir, Dashboard(runtime_dir.name, plan, built_with, warnings), launcher, signals
         )
         output = NonBlockingOutput(sys.stdout.fileno())
         with Screen(sys.stdin.fileno(), output) as screen:
@@ -108,9 +108,9 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
 class _LauncherConnection:
     """A connection to the launcher that is read line by line, without waiting."""
 
-    def __init__(self, place: RuntimeDir) -> None:
+    def __init__(self, runtime_dir: RuntimeDir) -> None:
         """Connect, or raise OSError."""
-        self._socket = connect(place)
+        self._socket = connect(runtime_dir)
         self._socket.setblocking(False)  # noqa: FBT003 (its only argument)
         self._rest = b""
 
@@ -146,11 +146,11 @@ class _LauncherConnection:
 
 class _LiveView:
     def __init__(
-        self, place: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals
+        self, runtime_dir: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals
     ) -> None:
         from tfcompose.cli.keys import KeyDecoder
 
-        self._place = place
+        self._runtime_dir = runtime_dir
         self._dashboard = dashboard
         self._launcher = launcher
         self._signals = signals
@@ -182,7 +182,7 @@ class _LiveView:
                     self._wait_for_terminal()
                     for key, _ in selector.select(self._sleep_s()):
                         key.data()
-                    for number in self._signals.taken():
+                    for number in self._signals.take():
                         self._take_signal(number)
                     self._work()
                     self._draw()
@@ -212,7 +212,7 @@ class _LiveView:
             for notice in self._last:
                 console(notice)
         if not any(isinstance(notice, Ended) for notice in self._last):
-            warn(f"the launcher has ended; see {self._place.logs / 'launcher.err'}")
+            warn(f"the launcher has ended; see {self._runtime_dir.logs / 'launcher.err'}")
 
     # What comes.
 
@@ -226,14 +226,14 @@ class _LiveView:
         self._connect_at = time.monotonic() + STATUS_EVERY_S
         with contextlib.suppress(OSError):
             if self._events is None:
-                self._events = _LauncherConnection(self._place)
+                self._events = _LauncherConnection(self._runtime_dir)
                 self._selector.register(self._events, selectors.EVENT_READ, self._take_events)
                 self._dashboard.forget()
                 self._last.clear()
                 self._left_out = 0
                 self._events.send(EventsRequest())
             if self._states is None:
-                self._states = _LauncherConnection(self._place)
+                self._states = _LauncherConnection(self._runtime_dir)
                 self._requested = False
                 self._selector.register(self._states, selectors.EVENT_READ, self._take_status)
 
@@ -255,7 +255,7 @@ class _LiveView:
                 del self._last[0]
                 self._left_out += 1
             if isinstance(notice, Replanned):
-                self._dashboard.plan = plan_of_run(self._place) or self._dashboard.plan
+                self._dashboard.plan = plan_of_run(self._runtime_dir) or self._dashboard.plan
 
     def _take_status(self) -> None:
         try:
@@ -297,7 +297,7 @@ class _LiveView:
 
     def _follow_log(self, name: str | None) -> None:
         """Read the process's log from this run's begin, or no more."""
-        folder = self._place.logs
+        folder = self._runtime_dir.logs
         since_s = max(runs_of(folder), default=0.0)
         self._follower = (
             Follower(folder, [name], back=LOG_BYTES, since_s=since_s) if name else None

@@ -101,7 +101,7 @@ def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span
     from tfcompose.compiler.emit.plan import plan_of
 
     robot = compile_or_exit(file, arguments).with_final_names()
-    return plan_of(robot), {edge.child: edge.at for edge in robot.edges}
+    return plan_of(robot), {edge.child: edge.span for edge in robot.edges}
 
 
 def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
@@ -138,7 +138,7 @@ def host_share(plan: Plan, host: str | None, here: str) -> Plan:
 
 
 def copy_plan(
-    plan: Plan, file: Path, place: RuntimeDir, *, alone: bool, build_dir: Path | None = None
+    plan: Plan, file: Path, runtime_dir: RuntimeDir, *, alone: bool, build_dir: Path | None = None
 ) -> Path:
     """Copy the plan and its files to the run's folder; return the copy.
 
@@ -163,9 +163,9 @@ def copy_plan(
                 parts[name], ((build_dir or file.parent) / name).parent
             )
         digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
-        folder = place.plan_folder(digest)
+        folder = runtime_dir.plan_folder(digest)
         if alone:
-            for old in set(place.plan_folders()) - {folder}:
+            for old in set(runtime_dir.plan_folders()) - {folder}:
                 shutil.rmtree(old, ignore_errors=True)
         try:
             _write_copy(parts, folder)
@@ -176,7 +176,7 @@ def copy_plan(
     except RejectedError as error:
         reject(error.findings)
     except OSError as error:
-        fail(f"the plan cannot be copied to {place.folder}: {error.strerror}", UNREADABLE)
+        fail(f"the plan cannot be copied to {runtime_dir.folder}: {error.strerror}", UNREADABLE)
     return folder / PLAN
 
 

@@ -462,21 +462,23 @@ def node_facts(name: str) -> dict[str, Any]:
 
 
 def _claim(claim: ClaimSpec, usual: Mapping[str, str]) -> dict[str, Any]:
-    def named(value: Any) -> Any:
+    def with_name(value: Any) -> Any:
         if isinstance(value, str):
             return _ROLE.sub(lambda role: usual.get(role[1], role[0]), value)
         return (
-            {key: named(item) for key, item in value.items()} if isinstance(value, dict) else value
+            {key: with_name(item) for key, item in value.items()}
+            if isinstance(value, dict)
+            else value
         )
 
     return {
-        "parent": named(claim.parent),
-        "child": named(claim.child),
+        "parent": with_name(claim.parent),
+        "child": with_name(claim.child),
         "topic": "/tf_static" if claim.static else "/tf",
         "by_default": claim.by_default,
-        "on": named(claim.on),
-        "off": named(claim.off),
-        "chosen_by": named(claim.chosen_by),
+        "on": with_name(claim.on),
+        "off": with_name(claim.off),
+        "chosen_by": with_name(claim.chosen_by),
     }
 
 

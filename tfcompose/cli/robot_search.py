@@ -88,4 +88,4 @@ def is_robot(file: str) -> bool:
     try:
         return bool(_ROBOT.search(read_bytes(file)))
     except RejectedError as error:  # what is larger than a robot may be is none
-        return all(found.code == "TF001" for found in error.findings)
+        return all(finding.code == "TF001" for finding in error.findings)

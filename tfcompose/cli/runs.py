@@ -13,7 +13,7 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, wait_for_data, warn
 from tfcompose.foundation import procfs
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.launcher.control import RequestRefusedError, ask, connect
 from tfcompose.launcher.leftovers import leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
@@ -52,16 +52,16 @@ def running() -> list[tuple[RuntimeDir, Holder]]:
     Raises:
         RuntimeDirError: if there is no folder that only this user can open.
     """
-    found = [(place, place.holder()) for place in runtime_dirs(os.environ)]
-    return [(place, holder) for place, holder in found if holder]
+    found = [(runtime_dir, runtime_dir.holder()) for runtime_dir in runtime_dirs(os.environ)]
+    return [(runtime_dir, holder) for runtime_dir, holder in found if holder]
 
 
-def is_meant(place: RuntimeDir, name: str) -> bool:
+def is_meant(runtime_dir: RuntimeDir, name: str) -> bool:
     """Return whether this name means the robot.
 
     Its own, one without the domain, or without a host's name too.
     """
-    return name in {place.name, place.share, place.robot}
+    return name in {runtime_dir.name, runtime_dir.share, runtime_dir.robot}
 
 
 def chosen_run(
@@ -76,12 +76,16 @@ def chosen_run(
         SystemExit: after saying that there is none, or which there are.
     """
     try:
-        known = among() if among else [place for place, _ in running()]
+        known = among() if among else [runtime_dir for runtime_dir, _ in running()]
     except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
     verb = "has run" if among else "runs"
-    found = [place for place in known if is_meant(place, name)] if name else in_scope(known)
-    names = listed([place.name for place in known], NAMED_AT_MOST)
+    found = (
+        [runtime_dir for runtime_dir in known if is_meant(runtime_dir, name)]
+        if name
+        else in_scope(known)
+    )
+    names = list_names([runtime_dir.name for runtime_dir in known], NAMED_AT_MOST)
     if not known:
         fail(f"no robot {verb} here")
     if not found and name:
@@ -94,7 +98,7 @@ def chosen_run(
         )
     if len(found) > 1:
         fail(
-            f"several robots: {', '.join(place.name for place in found)}; choose one with --robot",
+            f"several robots: {', '.join(run.name for run in found)}; choose one with --robot",
             UNREADABLE,
         )
     return found[0]
@@ -105,9 +109,9 @@ def in_scope(places: list[RuntimeDir]) -> list[RuntimeDir]:
 
     Where there is none, those that the ``robot.yaml`` here names.
     """
-    found = [place for place in places if place.domain == domain_of(os.environ)]
+    found = [runtime_dir for runtime_dir in places if runtime_dir.domain == domain_of(os.environ)]
     robot = _robot_here() if places and not found else None
-    return found or [place for place in places if place.robot == robot]
+    return found or [runtime_dir for runtime_dir in places if runtime_dir.robot == robot]
 
 
 def _robot_here() -> str | None:
@@ -121,14 +125,14 @@ def _robot_here() -> str | None:
     return name if isinstance(name, str) else None
 
 
-def request(place: RuntimeDir, question: Request, answer: type[A]) -> A | None:
+def request(runtime_dir: RuntimeDir, question: Request, answer: type[A]) -> A | None:
     """Return the launcher's answer, or None after saying why there is none, or that it refuses."""
     try:
-        return ask(place, question, answer)
+        return ask(runtime_dir, question, answer)
     except RequestRefusedError as error:
         warn(str(error))
     except OSError as error:
-        warn(f"{place.name} does not answer: {error}")
+        warn(f"{runtime_dir.name} does not answer: {error}")
     return None
 
 
@@ -138,10 +142,10 @@ def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
     if files:
         advice = "down stops a robot" if verb == "stop" else f"up {files[0]} starts a robot"
         fail(f"{verb} takes processes of a running robot; tfcompose {advice}", UNREADABLE)
-    place = chosen_run(arguments.robot, shlex.join([verb, *arguments.name]))
+    runtime_dir = chosen_run(arguments.robot, shlex.join([verb, *arguments.name]))
     code = 0
     for name in arguments.name:
-        answer = request(place, ProcessRequest(verb, name), Done)
+        answer = request(runtime_dir, ProcessRequest(verb, name), Done)
         if answer is None:
             code = FAILED
             continue
@@ -151,7 +155,7 @@ def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
 
 
 def notices(
-    place: RuntimeDir, timeout_s: float | None = None, output: TextIO | None = None
+    runtime_dir: RuntimeDir, timeout_s: float | None = None, output: TextIO | None = None
 ) -> Iterator[tuple[Notice, float]]:
     """Yield past and new notices of the launcher with their times, until it ends.
 
@@ -163,7 +167,7 @@ def notices(
             nobody reads.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
-    with connect(place) as connection:
+    with connect(runtime_dir) as connection:
         connection.sendall(line_of(EventsRequest()))
         rest = b""
         while True:
@@ -187,7 +191,7 @@ def notices(
 
 
 def wait_until_ready(
-    place: RuntimeDir, timeout_s: float | None, *, without_errors: bool = False
+    runtime_dir: RuntimeDir, timeout_s: float | None, *, without_errors: bool = False
 ) -> int:
     """Wait until every process is ready and every edge live.
 
@@ -198,33 +202,33 @@ def wait_until_ready(
     end = None if timeout_s is None else time.monotonic() + timeout_s
     while True:
         try:
-            status = ask(place, StatusRequest(), RobotStatus)
+            status = ask(runtime_dir, StatusRequest(), RobotStatus)
         except OSError:
-            warn(f"{place.name} has ended; see tfcompose logs")
+            warn(f"{runtime_dir.name} has ended; see tfcompose logs")
             return FAILED
         if status.ready and not (without_errors and _errors(status)):
             return 0
         if timeout_s is not None and end is not None and time.monotonic() >= end:
-            print_missing(place, timeout_s)
+            print_missing(runtime_dir, timeout_s)
             return FAILED
         time.sleep(ASK_EVERY_S)
 
 
 def _errors(status: RobotStatus) -> list[Finding]:
-    return [found for found in status.findings if found.severity == "error"]
+    return [finding for finding in status.findings if finding.severity == "error"]
 
 
-def print_missing(place: RuntimeDir, timeout_s: float) -> None:
+def print_missing(runtime_dir: RuntimeDir, timeout_s: float) -> None:
     """Complain about each process that is not ready, and each edge that is not live."""
     try:
-        status = ask(place, StatusRequest(), RobotStatus)
+        status = ask(runtime_dir, StatusRequest(), RobotStatus)
     except OSError as error:
-        warn(f"{place.name} does not answer: {error}")
+        warn(f"{runtime_dir.name} does not answer: {error}")
         return
     missing = status.missing
     warn(
-        f"{place.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose logs"
-        " and down"
+        f"{runtime_dir.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose"
+        " logs and down"
     )
     for process in status.processes:
         if process.failed:
@@ -232,9 +236,9 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
         elif not process.ready and process.state != "exited":
             warn(f"  not ready: {process.name} ({_why_not_ready(process)})")
     if missing:
-        warn(f"  not live: {listed(missing, NAMED_AT_MOST)}")
-    for found in _errors(status):
-        warn(f"  {found.severity}[{found.code}] {found.message}")
+        warn(f"  not live: {list_names(missing, NAMED_AT_MOST)}")
+    for finding in _errors(status):
+        warn(f"  {finding.severity}[{finding.code}] {finding.message}")
 
 
 def _why_not_ready(process: ProcessStatus) -> str:
@@ -261,11 +265,11 @@ def since(holder: Holder) -> str:
     return time.strftime(form, at)
 
 
-def hidden_run(place: RuntimeDir) -> str | None:
+def find_hidden_run(runtime_dir: RuntimeDir) -> str | None:
     """Return a message if the robot already runs in another runtime directory."""
     led = [
         leftover
-        for leftover in leftovers(f"{place.name}:")
+        for leftover in leftovers(f"{runtime_dir.name}:")
         if leftover.launcher not in (None, os.getpid())
     ]
     if not led or led[0].launcher is None:
@@ -274,18 +278,22 @@ def hidden_run(place: RuntimeDir) -> str | None:
         folder = procfs.environ(led[0].launcher).get("XDG_RUNTIME_DIR")
         where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
         return (
-            f"{place.name} runs already: pid {led[0].launcher}, with {where}; set it for ps and"
-            " down"
+            f"{runtime_dir.name} runs already: pid {led[0].launcher}, with {where}; set it for ps"
+            " and down"
         )
     return None
 
 
-def warnings_before_start(place: RuntimeDir, plan: Plan, run_id: str) -> list[str]:
+def warnings_before_start(runtime_dir: RuntimeDir, plan: Plan, run_id: str) -> list[str]:
     """Return obstacles to the start of a robot, a sentence each."""
-    return [*other_domains(place), *_left_behind(place, run_id), *_neighbours(place, plan)]
+    return [
+        *other_domains(runtime_dir),
+        *_left_behind(runtime_dir, run_id),
+        *_neighbours(runtime_dir, plan),
+    ]
 
 
-def _neighbours(place: RuntimeDir, plan: Plan) -> Iterator[str]:
+def _neighbours(runtime_dir: RuntimeDir, plan: Plan) -> Iterator[str]:
     """Name other robots that run in the domain on the same TF topics.
 
     Each guard would report the other's.
@@ -293,12 +301,12 @@ def _neighbours(place: RuntimeDir, plan: Plan) -> Iterator[str]:
     found = [
         (other.robot, holder)
         for other, holder in running()
-        if other.domain == place.domain
-        and other.robot != place.robot
+        if other.domain == runtime_dir.domain
+        and other.robot != runtime_dir.robot
         and _share_topics(other, plan)
     ]
     for robot, holder in found:
-        where = f"runs in domain {place.domain} on the same TF topics"
+        where = f"runs in domain {runtime_dir.domain} on the same TF topics"
         yield f"{robot} (pid {holder.pid}, since {since(holder)}) {where}"
     if found:
         yield (
@@ -315,28 +323,28 @@ def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
     )
 
 
-def other_domains(place: RuntimeDir) -> Iterator[str]:
+def other_domains(runtime_dir: RuntimeDir) -> Iterator[str]:
     """Name runs of the same robot in other domains, such as before a domain_id changed."""
     for other, holder in running():
-        if other.share == place.share and other.domain != place.domain:
+        if other.share == runtime_dir.share and other.domain != runtime_dir.domain:
             yield (
                 f"{other.name} still runs (pid {holder.pid}, since {since(holder)}); "
                 f"tfcompose down --robot {other.name} stops it"
             )
 
 
-def plan_file(place: RuntimeDir) -> Path:
+def plan_file(runtime_dir: RuntimeDir) -> Path:
     """Return the copy of the plan that a robot runs.
 
     Raises OSError or ValueError if it is not there any more.
     """
-    return max(place.plan_folders(), key=lambda folder: folder.stat().st_mtime) / "plan.json"
+    return max(runtime_dir.plan_folders(), key=lambda folder: folder.stat().st_mtime) / "plan.json"
 
 
-def plan_of_run(place: RuntimeDir) -> Plan | None:
+def plan_of_run(runtime_dir: RuntimeDir) -> Plan | None:
     """Return the plan that a robot runs, or None if it cannot be read any more."""
     try:
-        return read_plan(plan_file(place).read_text("utf-8"), "plan.json")
+        return read_plan(plan_file(runtime_dir).read_text("utf-8"), "plan.json")
     except (OSError, ValueError, RejectedError):
         return None
 
@@ -347,7 +355,11 @@ def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
     None for none, or for several.
     """
     try:
-        found = [place for place, _ in running() if place.domain == domain_of(os.environ)]
+        found = [
+            runtime_dir
+            for runtime_dir, _ in running()
+            if runtime_dir.domain == domain_of(os.environ)
+        ]
     except RuntimeDirError:
         return None
     plan = plan_of_run(found[0]) if len(found) == 1 else None
@@ -366,15 +378,15 @@ def plan_of_domain() -> Plan | None:
     return running[1]
 
 
-def _left_behind(place: RuntimeDir, run_id: str) -> Iterator[str]:
+def _left_behind(runtime_dir: RuntimeDir, run_id: str) -> Iterator[str]:
     """Name processes of earlier runs that are still there."""
     found = [
         leftover
-        for leftover in leftovers(f"{place.name}:")
+        for leftover in leftovers(f"{runtime_dir.name}:")
         if leftover.run != run_id and leftover.launcher is None
     ]
     for leftover in found:
         yield f"an earlier run left {leftover.pid} behind: {leftover.command}"
     if found:
         them = "it" if len(found) == 1 else "them"
-        yield f"tfcompose down --leftovers --robot {place.name} stops {them}"
+        yield f"tfcompose down --leftovers --robot {runtime_dir.name} stops {them}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from tfcompose.foundation.tool import installed
+from tfcompose.foundation.tool import installed_tools
 
 #: The languages of the core.
 LANGUAGES = ("robot", "overlay", "preset", "node", "plan")
@@ -12,7 +12,7 @@ LANGUAGES = ("robot", "overlay", "preset", "node", "plan")
 
 def languages() -> tuple[str, ...]:
     """Return the languages of the core and of all installed tools."""
-    return (*LANGUAGES, *installed().languages())
+    return (*LANGUAGES, *installed_tools().languages())
 
 
 #: Languages whose keys are not described for people, and why.

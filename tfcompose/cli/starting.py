@@ -24,13 +24,13 @@ from tfcompose.cli.console import (
     StandardOutput,
     StatusLine,
     describe_changes,
-    describe_vanished,
+    describe_vanished_edges,
 )
 from tfcompose.cli.live_run import can_show_live, follow
 from tfcompose.cli.plans import copy_plan, is_plan, plan_to_start, read_built_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import (
-    hidden_run,
+    find_hidden_run,
     notices,
     print_missing,
     request,
@@ -116,41 +116,41 @@ def start(
         fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
     _refuse_trouble(plan, file, arguments)
     try:
-        place = runtime_dir_of(plan, os.environ)
-        lock = Lock(place)
+        runtime_dir = runtime_dir_of(plan, os.environ)
+        lock = Lock(runtime_dir)
     except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
     except BlockingIOError:
-        return _update(plan, file, place, arguments)
+        return _update(plan, file, runtime_dir, arguments)
     except OSError as error:
         fail(f"the run cannot be recorded: {error}", UNREADABLE)
     with ExitStack() as stack:
         stack.callback(lock.close)
         if arguments.update or ros_trouble(os.environ):
-            fail(f"{place.name} does not run, and up --update starts nothing")
-        if hidden := hidden_run(place):
+            fail(f"{runtime_dir.name} does not run, and up --update starts nothing")
+        if hidden := find_hidden_run(runtime_dir):
             fail(hidden)
-        copy = copy_plan(plan, file, place, alone=True)
+        copy = copy_plan(plan, file, runtime_dir, alone=True)
         session = RunSession(
             copy,
-            RunFiles(place, lock, copy),
+            RunFiles(runtime_dir, lock, copy),
             file.absolute().parent,
             forker=forker,
             events=events,
         )
-        warnings = warnings_before_start(place, plan, session.run_id)
+        warnings = warnings_before_start(runtime_dir, plan, session.run_id)
         for warning in warnings:
             warn(warning)
         if arguments.detach or arguments.wait:
-            return _detach(plan, place, lock, session, arguments)
+            return _detach(plan, runtime_dir, lock, session, arguments)
         if arguments.live and can_show_live():
             mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
-            pid = _fork(plan, place, lock, session, arguments.duration, mask)
+            pid = _fork(plan, runtime_dir, lock, session, arguments.duration, mask)
             stack.close()  # the lock is the launcher's from now on
-            return follow(place, plan, pid, mask, built_with, warnings)
+            return follow(runtime_dir, plan, pid, mask, built_with, warnings)
         session.output = NonBlockingOutput(sys.stdout.fileno())
         stack.callback(session.output.close)
-        return _run(plan, place, session, session.output, arguments.duration)
+        return _run(plan, runtime_dir, session, session.output, arguments.duration)
 
 
 def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
@@ -160,26 +160,26 @@ def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
         SystemExit: after saying all of it.
     """
     trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True), plan.ros)
-    found = (
+    findings = (
         [trouble]
         if trouble
         else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
     )
-    if found:
-        reject([_with_profiles(finding, arguments) for finding in found])
+    if findings:
+        reject([_with_profiles(finding, arguments) for finding in findings])
     odd = (other_middleware(os.environ, plan.ros), other_distro(os.environ, plan.ros))
     print_findings([finding for finding in odd if finding], sys.stderr)
 
 
 def _run(
     plan: Plan,
-    place: RuntimeDir,
+    runtime_dir: RuntimeDir,
     session: RunSession,
     output: NonBlockingOutput,
     duration_s: float | None,
 ) -> int:
     """Run the plan on this terminal until it ends, and return the exit code."""
-    logs = Logs(place.logs)
+    logs = Logs(runtime_dir.logs)
     status = StatusLine(plan, lambda: size_of(output.fd)[0]) if can_redraw(sys.stdout) else None
     console = Console(
         plan,
@@ -198,22 +198,22 @@ def _run(
         logs.close()
 
 
-def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> int:
+def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespace) -> int:
     """Bring the running robot to the plan.
 
     Exit code 0, 1 where it runs as it is and was to be started here.
     """
-    holder = place.holder()
+    holder = runtime_dir.holder()
     who = (
-        f"{place.name} runs already: pid {holder.pid}, since {since(holder)}"
+        f"{runtime_dir.name} runs already: pid {holder.pid}, since {since(holder)}"
         if holder
-        else f"{place.name} just ended"
+        else f"{runtime_dir.name} just ended"
     )
     folder = (
         Path(arguments.build_dir).absolute() if arguments.build_dir else file.absolute().parent
     )
-    copy = copy_plan(plan, file, place, alone=False, build_dir=folder)
-    answer = request(place, UpdateRequest(str(copy), str(folder)), PlanChange)
+    copy = copy_plan(plan, file, runtime_dir, alone=False, build_dir=folder)
+    answer = request(runtime_dir, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
         fail(who)
     changes = describe_changes(
@@ -226,21 +226,21 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     else:
         warn(f"{who}; the plan is the same; tfcompose down stops it")
     if answer.held and changes:
-        print(describe_vanished(answer.held))
+        print(describe_vanished_edges(answer.held))
     if arguments.wait:
-        return wait_until_ready(place, arguments.timeout)
+        return wait_until_ready(runtime_dir, arguments.timeout)
     return 0 if changes or answer.differs or arguments.detach or arguments.update else FAILED
 
 
-def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
+def _with_profiles(finding: Finding, arguments: Namespace) -> Finding:
     """Return the finding; if programs are missing, with the profiles that can do without them."""
-    if found.code != "TF810" or is_plan(arguments.file):
-        return found
+    if finding.code != "TF810" or is_plan(arguments.file):
+        return finding
     profiles = _profiles_that_start(arguments)
     if not profiles:
-        return found
+        return finding
     advice = f"to start without them: tfcompose up {arguments.file} --profile {profiles}"
-    return replace(found, help="; ".join(filter(None, (found.help, advice))))
+    return replace(finding, help="; ".join(filter(None, (finding.help, advice))))
 
 
 def _profiles_that_start(arguments: Namespace) -> str:
@@ -280,25 +280,25 @@ def _starts_with(profiles: Sequence[str], arguments: Namespace) -> bool:
 
 
 def _detach(
-    plan: Plan, place: RuntimeDir, lock: Lock, session: RunSession, arguments: Namespace
+    plan: Plan, runtime_dir: RuntimeDir, lock: Lock, session: RunSession, arguments: Namespace
 ) -> int:
     """Start the launcher as a separate process; return 0 when all processes are started, or ready.
 
     1 when it is not.
     """
-    if goes_with_logout(place):
+    if goes_with_logout(runtime_dir):
         user = user_name()
         warn(
-            f"{user} does not linger: a logout removes {place.folder}, and may end the robot; to"
-            f" keep them: loginctl enable-linger {user}"
+            f"{user} does not linger: a logout removes {runtime_dir.folder}, and may end the"
+            f" robot; to keep them: loginctl enable-linger {user}"
         )
-    pid = _fork(plan, place, lock, session, arguments.duration)
-    return _follow(plan, place, pid, arguments)
+    pid = _fork(plan, runtime_dir, lock, session, arguments.duration)
+    return _follow(plan, runtime_dir, pid, arguments)
 
 
 def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
     plan: Plan,
-    place: RuntimeDir,
+    runtime_dir: RuntimeDir,
     lock: Lock,
     session: RunSession,
     duration_s: float | None,
@@ -319,7 +319,7 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
             if mask is not None:
                 end_with(starter, signal.SIGTERM)
                 signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-            code = _launch(plan, place, session, duration_s)
+            code = _launch(plan, runtime_dir, session, duration_s)
         except KeyboardInterrupt:
             code = INTERRUPTED
         except BaseException:  # noqa: BLE001 (nobody further out says what it was)
@@ -332,18 +332,22 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
     return pid
 
 
-def _launch(plan: Plan, place: RuntimeDir, session: RunSession, duration_s: float | None) -> int:
+def _launch(
+    plan: Plan, runtime_dir: RuntimeDir, session: RunSession, duration_s: float | None
+) -> int:
     """Run as a process without a terminal; Python's own errors go to a file next to the logs."""
     os.setsid()
     nowhere = errors = os.open(os.devnull, os.O_RDWR)
     with contextlib.suppress(OSError):  # a full disk stops no robot
-        place.logs.mkdir(parents=True, exist_ok=True)
-        errors = os.open(place.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640)
+        runtime_dir.logs.mkdir(parents=True, exist_ok=True)
+        errors = os.open(
+            runtime_dir.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640
+        )
     for fd, to in ((0, nowhere), (1, errors), (2, errors)):
         os.dup2(to, fd)
     for fd in {nowhere, errors}:
         os.close(fd)
-    logs = Logs(place.logs)
+    logs = Logs(runtime_dir.logs)
     console = Console(plan, Nowhere(), colour=False, keep=logs.write)
     try:
         return supervise(
@@ -353,7 +357,7 @@ def _launch(plan: Plan, place: RuntimeDir, session: RunSession, duration_s: floa
         logs.close()
 
 
-def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> int:
+def _follow(plan: Plan, runtime_dir: RuntimeDir, pid: int, arguments: Namespace) -> int:
     console = Console(
         plan,
         StandardOutput(),
@@ -363,23 +367,24 @@ def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> in
     goal = AllReady if arguments.wait else AllStarted
     with contextlib.suppress(OSError):
         try:
-            for notice, _ in notices(place, arguments.timeout if arguments.wait else None):
+            for notice, _ in notices(runtime_dir, arguments.timeout if arguments.wait else None):
                 console(notice)
                 if isinstance(notice, Ended):
                     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
                 if isinstance(notice, goal):
                     print(
-                        f"{place.name} runs in the background: pid {pid}; see tfcompose ps, logs"
-                        " -f and down"
+                        f"{runtime_dir.name} runs in the background: pid {pid}; see tfcompose ps,"
+                        " logs -f and down"
                     )
                     return 0
         except TimeoutError:
-            print_missing(place, arguments.timeout)
+            print_missing(runtime_dir, arguments.timeout)
             return FAILED
         except KeyboardInterrupt:
             warn(
-                f"{place.name} keeps running in the background: pid {pid}; tfcompose down stops it"
+                f"{runtime_dir.name} keeps running in the background: pid {pid}; tfcompose down"
+                " stops it"
             )
             return INTERRUPTED
-    warn(f"the launcher has ended; see {place.logs / 'launcher.err'}")
+    warn(f"the launcher has ended; see {runtime_dir.logs / 'launcher.err'}")
     return FAILED

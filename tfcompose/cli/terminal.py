@@ -57,7 +57,9 @@ def fail(message: str, code: int = FAILED) -> NoReturn:
 MOST_OF_ONE_CODE = 10
 
 
-def print_findings(found: Sequence[Finding], stream: TextIO, *, most: int | None = None) -> None:
+def print_findings(
+    findings: Sequence[Finding], stream: TextIO, *, most: int | None = None
+) -> None:
     """Print findings for people, with the lines that they are about.
 
     ``most`` of one code are printed of a file, and how many more there are; None: all.
@@ -66,7 +68,7 @@ def print_findings(found: Sequence[Finding], stream: TextIO, *, most: int | None
 
     shown: list[Finding] = []
     counts: Counter[tuple[str, str]] = Counter()
-    for finding in found:
+    for finding in findings:
         place = (finding.span.file if finding.span else "", finding.code)
         counts[place] += 1
         if most is None or counts[place] <= most:
@@ -80,19 +82,19 @@ def print_findings(found: Sequence[Finding], stream: TextIO, *, most: int | None
             stream.write(f"{where}and {count - most} more {code}{how}\n")
 
 
-def reject(found: Sequence[Finding], code: int | None = None) -> NoReturn:
+def reject(findings: Sequence[Finding], code: int | None = None) -> NoReturn:
     """Print findings to stderr and end the command.
 
     Raises:
         SystemExit: with the exit code, unless given that of ``exit_code_of``.
     """
-    print_findings(found, sys.stderr, most=MOST_OF_ONE_CODE)
-    raise SystemExit(code or exit_code_of(found))
+    print_findings(findings, sys.stderr, most=MOST_OF_ONE_CODE)
+    raise SystemExit(code or exit_code_of(findings))
 
 
-def exit_code_of(found: Sequence[Finding]) -> int:
+def exit_code_of(findings: Sequence[Finding]) -> int:
     """Return 2 if the command lacks a file, ROS or a package, else 1."""
-    return UNREADABLE if any(finding.code in _LACKING for finding in found) else FAILED
+    return UNREADABLE if any(finding.code in _LACKING for finding in findings) else FAILED
 
 
 def is_coloured(stream: TextIO) -> bool:
@@ -176,21 +178,21 @@ def plain(text: str) -> str:
 
     Other characters that cannot be seen are marked.
     """
-    return "".join(map(_marked, _SEQUENCE.split(text)[::2]))
+    return "".join(map(_mark, _SEQUENCE.split(text)[::2]))
 
 
 def keep_colours(text: str) -> str:
     """Return the text with its colours, which end with it, and without other control sequences."""
     pieces = _SEQUENCE.split(text)
     if len(pieces) == 1:
-        return _marked(text)
+        return _mark(text)
     colours = [(_COLOUR.fullmatch(piece) and piece) or "" for piece in pieces[1::2]]
-    pieces[::2], pieces[1::2] = map(_marked, pieces[::2]), colours
+    pieces[::2], pieces[1::2] = map(_mark, pieces[::2]), colours
     last = "".join(colours).rpartition("\033")[2]
     return "".join(pieces) + (PLAIN if last and f"\033{last}" != PLAIN else "")
 
 
-def _marked(text: str) -> str:
+def _mark(text: str) -> str:
     return mask_invisible(text, "\N{REPLACEMENT CHARACTER}", kept="\t")
 
 

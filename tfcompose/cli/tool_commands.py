@@ -10,7 +10,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import UNREADABLE, fail
-from tfcompose.foundation.tool import absent, installed, load, shipped
+from tfcompose.foundation.tool import absent, installed_tools, load, shipped_tools
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -92,12 +92,12 @@ def summary_of(command: CommandModule) -> str:
 
 def all_commands() -> list[ToolCommand]:
     """Return the commands of all installed tools."""
-    return [ToolCommand(tool, command) for tool, command in installed().commands()]
+    return [ToolCommand(tool, command) for tool, command in installed_tools().commands()]
 
 
 def find(name: str) -> ToolCommand | None:
     """Return the command of a tool; None if no tool has it."""
-    for toolset in (shipped, installed):
+    for toolset in (shipped_tools, installed_tools):
         for tool, command in toolset().commands():
             if command.name == name:
                 return ToolCommand(tool, command)
@@ -123,7 +123,7 @@ _SYNONYMS = {
 
 def instead_of(name: str) -> str:
     """Return advice for a word that other programs have for a command; empty if none has."""
-    of_tools = (pair for _, command in installed().commands() for pair in command.synonyms)
+    of_tools = (pair for _, command in installed_tools().commands() for pair in command.synonyms)
     command = (_SYNONYMS | dict(of_tools)).get(name)
     return f"that is tfcompose {command}" if command else ""
 
@@ -134,7 +134,7 @@ def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOpti
     Return what was added.
     """
     added: list[ToolOption] = []
-    for toolset in (shipped, installed):
+    for toolset in (shipped_tools, installed_tools):
         if not parser.lacks_option(argv):
             break
         added += _add(name, parser, toolset(), added)
@@ -145,7 +145,7 @@ def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOpti
 
 def add_all_options(name: str, parser: Parser) -> list[ToolOption]:
     """Add the options of all installed tools to a command."""
-    return _add(name, parser, installed(), ())
+    return _add(name, parser, installed_tools(), ())
 
 
 def _add(
@@ -178,7 +178,7 @@ def _refuse_absent(parser: Parser, argv: Sequence[str]) -> None:
 
 def report_problems() -> None:
     """Print problems of tools in other packages."""
-    problems = installed().problems
+    problems = installed_tools().problems
     if problems:
         from tfcompose.cli.terminal import print_findings
         from tfcompose.foundation.findings import finding

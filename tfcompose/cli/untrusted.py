@@ -22,7 +22,7 @@ from tfcompose.compiler.urdf.packages import OUTSIDE
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.reach import Reach, is_package
 from tfcompose.foundation.reading import is_file, is_folder
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -145,7 +145,7 @@ class UntrustedFiles:
         """Return the same for a robot file, which may read packages under ``packages``."""
         for name, folder in source.mapping("packages").items():
             if isinstance(folder, str):
-                path = path_named(folder, source.at(("packages", name)))
+                path = find_path(folder, source.span_of(("packages", name)))
                 if is_package(posixpath.realpath(path)):
                     self.reach.add_folder(path)
         return self.disk()

@@ -15,9 +15,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import compiled_without_errors
+from tfcompose.cli.compiling import compile_without_errors
 from tfcompose.cli.terminal import UNREADABLE, fail, reject, warn
-from tfcompose.compiler.emit import described, emit
+from tfcompose.compiler.emit import descriptions_of, emit
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.reading import exists, is_file, is_folder
 from tfcompose.model.files import Target, assets_without_address
@@ -201,7 +201,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
     reads_back = getattr(arguments, "read_back", False)
     if reads_back and find_spec("yourdfpy") is None:
         fail("--read-back needs the package yourdfpy: pip install 'tfcompose[view]'", UNREADABLE)
-    robot, compiled = compiled_without_errors(arguments.file, arguments)
+    robot, compiled = compile_without_errors(arguments.file, arguments)
     folder, target = destination(arguments, robot)
     lost = [
         _without_address(asset, target.form)
@@ -225,7 +225,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
         fail(f"nothing was written to {folder}: {error.strerror}{where}", UNREADABLE)
     if shared:
         warn(f"{folder} held the build of {shared}; -o builds into another folder")
-    return folder, [file.path for file in files], compiled.found
+    return folder, [file.path for file in files], compiled.findings
 
 
 def _source_file(folder: Path) -> Path:
@@ -258,18 +258,18 @@ def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Fi
 
     texts = {file.path: file.text for file in files}
     advice = "nothing was written; this is a bug in tfcompose: please report it"
-    found = []
-    for part, described_robot in described(robot):
+    findings = []
+    for part, described_robot in descriptions_of(robot):
         folder = f"{part}/" if part else ""
         inside = replace(target, folder=posixpath.join(target.folder, folder))
         for name, full in ((DESCRIPTION, True), (STOCK_DESCRIPTION, False)):
             path = folder + name
             differences_of = differences(described_robot, texts[path], inside, full=full)
-            found += [
+            findings += [
                 finding("TF910", f"{path}: {difference}", None, help=advice)
                 for difference in differences_of
             ]
-    return found
+    return findings
 
 
 def _without_address(asset: Asset, form: Form) -> Finding:
@@ -278,11 +278,11 @@ def _without_address(asset: Asset, form: Form) -> Finding:
         return finding(
             "TF724",
             f"{asset.uri} was not found and has no path",
-            asset.at,
+            asset.span,
             help="build without --mesh",
         )
     advice = (
         "a folder with a package.xml above it, packages: {name: FOLDER} and package://name/…, or"
         " no --mesh"
     )
-    return finding("TF726", f"{asset.uri} is in no package", asset.at, help=advice)
+    return finding("TF726", f"{asset.uri} is in no package", asset.span, help=advice)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.check import RULES, check, rules_of_tools, silence, with_replaced
+from tfcompose.compiler.check import RULES, add_replaced_notes, check, rules_of_tools, silence
 from tfcompose.compiler.resolve import Disk, Library, resolve
 from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Allow, Finding, RejectedError, without_duplicates
@@ -40,7 +40,7 @@ class Compiled:
     """
 
     robot: Robot | None
-    found: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
     allows: tuple[Allow, ...] = ()
     used: frozenset[tuple[Allow, str]] = frozenset()
     sources: tuple[Source, ...] = ()
@@ -48,7 +48,7 @@ class Compiled:
     @property
     def errors(self) -> tuple[Finding, ...]:
         """The findings that stand in the way of a build."""
-        return tuple(found for found in self.found if found.severity == "error")
+        return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
 def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
@@ -95,14 +95,16 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     draft, unresolved = resolve(validated, library, read, disk)
     source, parts, robot = validated.source, draft.collected, draft.robot
     rules = {
-        name: (level, source.at_key(("rules", name)))
+        name: (level, source.key_span(("rules", name)))
         for name, level in levels_of(validated, robot.limits)
     }
     codes = {code_of(name) for name, (level, _) in rules.items() if level == "off"}
     off = {code for code in codes if code and can_be_allowed(code)}
-    found = without_duplicates([*validated.found, *unresolved, *_check_robot(robot, off)])
+    findings = without_duplicates([*validated.findings, *unresolved, *_check_robot(robot, off)])
     sources = (source, *parts.sources)
-    kept, used = silence(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
+    kept, used = silence(
+        add_replaced_notes(findings, sources), rules, (*source.allows, *parts.allows)
+    )
     ordered = tuple(sorted(kept, key=lambda entry: entry.sort_key))
     return Compiled(robot, ordered, source.allows, frozenset(used), sources)
 
@@ -112,12 +114,12 @@ def _check_robot(robot: Robot, off: Collection[str]) -> list[Finding]:
 
     Rules whose codes are ``off`` are not asked.
     """
-    of_tools, found = rules_of_tools(robot)
+    of_tools, findings = rules_of_tools(robot)
     return [
         *(
             entry
             for rules in (RULES.values(), of_tools)
             for entry in check(robot, [rule for rule in rules if rule.code not in off])
         ),
-        *found,
+        *findings,
     ]

@@ -40,6 +40,6 @@ def _collada_unit(path: str) -> float:
     if not path.lower().endswith(".dae"):
         return 1.0
     with Path(path).open("rb") as file:
-        found = _UNIT.search(file.read(_HEAD))
-    metres = float(found[1]) if found else 1.0
+        match = _UNIT.search(file.read(_HEAD))
+    metres = float(match[1]) if match else 1.0
     return metres if 0 < metres < math.inf else 1.0

@@ -38,7 +38,7 @@ def values_of(edge: Edge, sources: Sequence[Source]) -> list[str]:
     lines = []
     for source, path, value in _given_values(edge, sources):
         over = ", over ".join(str(old) for old in source.replaced.get(path, ()))
-        place = f"{source.at(path)}, over {over}" if over else str(source.at(path))
+        place = f"{source.span_of(path)}, over {over}" if over else str(source.span_of(path))
         lines.append(f"{path[-1]}: {_show_value(value)}  {place}")
     return lines
 
@@ -47,7 +47,7 @@ def _given_values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Sourc
     for source in sources:
         for entry in _entries(edge, source):
             data = source.mapping(*entry)
-            if data and (source.at((*entry, "parent")) == edge.at or not edge.given):
+            if data and (source.span_of((*entry, "parent")) == edge.span or not edge.given):
                 yield from ((source, (*entry, key), data[key]) for key in _KEYS if key in data)
                 return
 

@@ -78,8 +78,8 @@ class Finding:
     @property
     def sort_key(self) -> tuple[str, int, int, str, str]:
         """By place, then by code: the order in which findings are shown."""
-        at = self.span or Span("")
-        return (at.file, at.line, at.column, self.code, self.message)
+        span = self.span or Span("")
+        return (span.file, span.line, span.column, self.code, self.message)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class Allow:
     codes: tuple[str, ...]
     line: int
     reason: str
-    at: Span
+    span: Span
     #: The last line that it covers; 0: ``line`` alone.
     last: int = 0
 
@@ -98,8 +98,8 @@ class RejectedError(Exception):
     """Raised by a stage that cannot go on; it holds everything that the stage found, in order."""
 
     def __init__(self, findings: Iterable[Finding]) -> None:
-        self.findings = tuple(sorted(findings, key=lambda found: found.sort_key))
-        super().__init__("; ".join(found.message for found in self.findings))
+        self.findings = tuple(sorted(findings, key=lambda finding: finding.sort_key))
+        super().__init__("; ".join(finding.message for finding in self.findings))
 
 
 def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are named)
@@ -126,13 +126,13 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     )
 
 
-def without_duplicates(found: Iterable[Finding]) -> list[Finding]:
+def without_duplicates(findings: Iterable[Finding]) -> list[Finding]:
     """Return each finding once, in order.
 
     Of those that differ in notes only, the first, with the notes of all.
     """
     first: dict[Finding, Finding] = {}
-    for finding in found:
+    for finding in findings:
         alone = replace(finding, notes=()) if finding.notes else finding
         before = first.setdefault(alone, finding)
         notes = dict.fromkeys((*before.notes, *finding.notes))
@@ -146,7 +146,7 @@ _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # as YAML counts lines
 
 def line_starts(text: str) -> list[int]:
     """Return where each line of a YAML text begins."""
-    return [0, *(found.end() for found in _BREAK.finditer(text))]
+    return [0, *(match.end() for match in _BREAK.finditer(text))]
 
 
 def apply_edits(text: str, edits: Sequence[Edit]) -> str | None:
@@ -155,15 +155,17 @@ def apply_edits(text: str, edits: Sequence[Edit]) -> str | None:
     newline = "\r\n" if "\r\n" in text else "\n"
     pieces: list[tuple[int, int, str]] = []
     for edit in edits:
-        at, new = edit.span, edit.text.replace("\n", newline)
-        if at.line == len(starts) + 1 and at.column == 1:  # behind a last line that does not end
+        span, new = edit.span, edit.text.replace("\n", newline)
+        if (
+            span.line == len(starts) + 1 and span.column == 1
+        ):  # behind a last line that does not end
             pieces.append((len(text), len(text), newline + new.removesuffix(newline)))
             continue
-        if at.end_line > len(starts):
+        if span.end_line > len(starts):
             return None
         begin, end = (
-            starts[at.line - 1] + at.column - 1,
-            starts[at.end_line - 1] + at.end_column - 1,
+            starts[span.line - 1] + span.column - 1,
+            starts[span.end_line - 1] + span.end_column - 1,
         )
         quote = text[begin : begin + 1] if end - begin > 1 and text[begin] == text[end - 1] else ""
         pieces.append((begin, end, f"{quote}{new}{quote}" if quote in {"'", '"'} else new))

@@ -8,7 +8,9 @@ from tfcompose.foundation.findings import Finding, Span, finding
 from tfcompose.foundation.tool import load
 
 
-def run_hook(reference: str, owner: str, at: Span | None, *arguments: Any) -> list[Any] | Finding:
+def run_hook(
+    reference: str, owner: str, span: Span | None, *arguments: Any
+) -> list[Any] | Finding:
     """Return what a tool's function yields; the finding TF903 where it crashes."""
     try:
         return list(load(reference)(*arguments))
@@ -16,6 +18,6 @@ def run_hook(reference: str, owner: str, at: Span | None, *arguments: Any) -> li
         return finding(
             "TF903",
             f"{reference} of {owner} crashed: {type(error).__name__}: {error}",
-            at,
+            span,
             help="this is a bug in the tool: please report it",
         )

@@ -47,7 +47,7 @@ class RememberedInterrupt:
     def __enter__(self) -> None:
         _remembered.clear()
         self._unraisable = sys.unraisablehook
-        sys.unraisablehook = self._thrown_away
+        sys.unraisablehook = self._print_unraisable
         self._is_set = signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._is_set:
             try:
@@ -63,7 +63,7 @@ class RememberedInterrupt:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, self._alarm)
 
-    def _thrown_away(self, what: sys.UnraisableHookArgs) -> None:
+    def _print_unraisable(self, what: sys.UnraisableHookArgs) -> None:
         """Let Python print what it throws away, but not an interrupt, which is remembered."""
         if what.exc_type is not KeyboardInterrupt:
             self._unraisable(what)

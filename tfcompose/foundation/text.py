@@ -21,7 +21,7 @@ def with_more(first: str, more: int, noun: str = "edge") -> str:
     return f"{first} and {plural(more, f'more {noun}')}" if more else first
 
 
-def listed(names: Iterable[object], most: int = LISTED) -> str:
+def list_names(names: Iterable[object], most: int = LISTED) -> str:
     """Return names with commas, and how many more there are than the first few.
 
     "a, b and 3 more".

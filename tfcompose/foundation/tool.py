@@ -207,7 +207,7 @@ def load(reference: str) -> Any:
 
 
 @cache
-def shipped() -> Toolset:
+def shipped_tools() -> Toolset:
     """Return the tools that ship; none where their folder is absent."""
     try:
         table = import_module(SHIPPED)
@@ -219,13 +219,13 @@ def shipped() -> Toolset:
 
 
 @cache
-def installed() -> Toolset:
+def installed_tools() -> Toolset:
     """Return the tools that ship, then those of other packages without clashes."""
     entries = _entry_points()
     if not entries:
-        return shipped()
+        return shipped_tools()
     problems: list[Problem] = []
-    tools = list(shipped().tools)
+    tools = list(shipped_tools().tools)
     owners = {name: tool.name for tool in tools for name in tool.names()}
     for entry_name, reference in entries:
         try:
@@ -270,7 +270,7 @@ def code_folders() -> Iterator[Path]:
 
     Those are looked up when reached.
     """
-    for toolset in (shipped, installed):
+    for toolset in (shipped_tools, installed_tools):
         yield from filter(None, (tool.code_folder for tool in toolset().tools))
 
 
@@ -281,7 +281,7 @@ def absent(name: str, *kinds: str) -> str:
     """
     entries = (_reserved_names().get((kind, name)) for kind in kinds)
     tool, extra = next(filter(None, entries), ("", ""))
-    if not extra or any(other.name == tool for other in shipped().tools):
+    if not extra or any(other.name == tool for other in shipped_tools().tools):
         return ""
     return f"{name} belongs to the tool {tool}, which is not installed: pip install '{extra}'"
 

@@ -292,7 +292,7 @@ def invalid(code: str, message: str, help: str = "", **more: Any) -> PydanticCus
     return PydanticCustomError(code, "{message}", {"message": message, "help": help, **more})
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """Return how a value is named in a message: short, and as it stands in YAML."""
     value = value.value if isinstance(value, Truth) else value
     if isinstance(value, bool) or value is None:
@@ -367,7 +367,7 @@ class Measure:
         if self.least is not None and number < self.least:
             what = "is not greater than 0" if number <= 0 else f"is less than {self.least:g}"
             advice = f"for example {example(self.dimensions[0])}"
-            raise invalid("TF106", f"{shown(value)} {what}", advice)
+            raise invalid("TF106", f"{format_value(value)} {what}", advice)
         return number
 
     def _in_si(self, value: Any) -> float:
@@ -375,7 +375,9 @@ class Measure:
         if kind is not float and kind is not int:
             value = self._convert(value)
         if not -LARGEST <= value <= LARGEST:
-            raise invalid("TF106", f"{shown(float(value))} is beyond what can be computed with")
+            raise invalid(
+                "TF106", f"{format_value(float(value))} is beyond what can be computed with"
+            )
         return value if kind is float else value if isinstance(value, WithUnit) else float(value)
 
     def _convert(self, value: Any) -> float:
@@ -396,7 +398,7 @@ class Measure:
             return value.value if value.dimension == NUMBER else WithUnit(value.value)
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return value
-        message = f"{shown(value)} is not {with_article(self.dimension)}"
+        message = f"{format_value(value)} is not {with_article(self.dimension)}"
         raise invalid("TF103", message, f"for example {example(self.dimension)}")
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:

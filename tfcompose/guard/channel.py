@@ -218,9 +218,9 @@ class FindingsReport:
         if time.monotonic() < self._due:
             return
         self._due = time.monotonic() + FINDINGS_EVERY_S
-        found = [finding for source in self._sources for finding in source()]
+        findings = [finding for source in self._sources for finding in source()]
         worst = tuple(
-            sorted(dict.fromkeys(found), key=lambda finding: finding.severity)[:MOST_FINDINGS]
+            sorted(dict.fromkeys(findings), key=lambda finding: finding.severity)[:MOST_FINDINGS]
         )
         if worst != self._reported:
             self._reported = worst

@@ -41,14 +41,14 @@ class Descriptions:
         """Give a node its description, instead of one that is still waiting."""
         self.forget(order.process)
         try:
-            found = _LINE.search(Path(order.file).read_text(encoding="utf-8"))
+            match = _LINE.search(Path(order.file).read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as error:
             self._emit(DescriptionState(order.process, f"{order.file} cannot be read: {error}"))
             return
-        if found is None:
+        if match is None:
             self._emit(DescriptionState(order.process, f"{order.file} has no description"))
             return
-        writer = ParameterWriter(self._node, order.node, _NAME, json.loads(found[1]))
+        writer = ParameterWriter(self._node, order.node, _NAME, json.loads(match[1]))
         self._writers[order.process] = writer, time.monotonic()
 
     def forget(self, process: str) -> None:

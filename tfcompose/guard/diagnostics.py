@@ -98,12 +98,12 @@ def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
     return Status(f"tfcompose {robot}: strict", WARN if held else OK, message, lines)
 
 
-def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) -> list[Status]:
+def statuses(robot: str, edges: Sequence[EdgeHealth], findings: Sequence[Finding]) -> list[Status]:
     """Return one status for the tree, with current faults, and one for each owner."""
-    severe = any(finding.severity == "error" for finding in found)
-    level = ERROR if severe else WARN if found else OK
+    severe = any(finding.severity == "error" for finding in findings)
+    level = ERROR if severe else WARN if findings else OK
     message = (
-        "; ".join(f"{finding.code} {finding.message}" for finding in found)
+        "; ".join(f"{finding.code} {finding.message}" for finding in findings)
         or f"{len(edges)} edges are watched"
     )
     lines = [
@@ -111,7 +111,7 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) 
             f"tfcompose {robot}: tree",
             level,
             message,
-            [(finding.code, finding.message) for finding in found],
+            [(finding.code, finding.message) for finding in findings],
         )
     ]
     for owner in dict.fromkeys(edge.edge.owner for edge in edges):

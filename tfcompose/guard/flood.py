@@ -37,7 +37,7 @@ class FloodReader:
         self._children = children
         self._data: TFData | None = None
         self._rest: Iterator[SentTransform] = iter(())
-        self._found: list[SentTransform] = []
+        self._transforms: list[SentTransform] = []
         self._spent_s = self._since = 0.0
 
     @property
@@ -50,7 +50,7 @@ class FloodReader:
         if self._data is not None:
             self.skipped += 1
             return
-        self._data, self._rest, self._found = data, transforms(data.received.data), []
+        self._data, self._rest, self._transforms = data, transforms(data.received.data), []
 
     def read(self, now: float) -> TFData | None:
         """Read on for a moment; return the message's declared edges once it is read."""
@@ -65,11 +65,11 @@ class FloodReader:
                 for _ in range(_TOGETHER):
                     transform = next(self._rest)
                     if transform.child.removeprefix("/") in self._children:
-                        self._found.append(transform)
+                        self._transforms.append(transform)
         except (StopIteration, ValueError):  # it is read, or as much of it as can be
             spent = time.thread_time() - begun
             self._data = None
         self._spent_s += spent
-        if self._data is not None or not self._found:
+        if self._data is not None or not self._transforms:
             return None
-        return replace(data, received=replace(data.received, data=encode(self._found)))
+        return replace(data, received=replace(data.received, data=encode(self._transforms)))

@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.guard.judge import FINDING_S
 from tfcompose.guard.verdict.drivers import not_taken
 from tfcompose.model.messages import FindingShown, Gate, GateState
@@ -158,7 +158,7 @@ def _some(what: str, names: list[str], wanted: str) -> str:
         names,
         key=lambda name: (name.rpartition("/")[2] != last, name.rpartition("/")[0] != above, name),
     )
-    return f"{what} {listed(names, NAMED_AT_MOST)}" if names else f"no {what}"
+    return f"{what} {list_names(names, NAMED_AT_MOST)}" if names else f"no {what}"
 
 
 def _lifecycle(node: Node, name: str, state: str, *, drive: bool) -> Lifecycle:

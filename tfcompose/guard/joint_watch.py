@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.guard.verdict.joints import planned_joints, sent_twice, unknown_joints
+from tfcompose.guard.verdict.joints import find_sent_twice, planned_joints, unknown_joints
 from tfcompose.model.messages import FindingShown, RecoveredShown
 from tfcompose.model.plan.topics import joint_states_topics
 from tfcompose.tf.live.joint_states import JointStates
@@ -54,8 +54,8 @@ class JointWatch:
         for states in self._topics:
             states.take()
             states.forget(wall_ns() - SENDS_NO_MORE_NS)
-            senders = states.sent()
-            for wrong in (*sent_twice(senders), *unknown_joints(senders, self._joints)):
+            senders = states.sent_joints()
+            for wrong in (*find_sent_twice(senders), *unknown_joints(senders, self._joints)):
                 found[wrong.code, wrong.message] = wrong
         for key, wrong in found.items():
             if key not in self._wrong:

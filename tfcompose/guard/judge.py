@@ -112,11 +112,15 @@ class Judge:
             self._sent.take(message)
         return self.ledger.take(message, now)
 
-    def arrived(self, judged: JudgedMessage, message: Message, now: float) -> list[GuardEvent]:
+    def judge_arrival(
+        self, judged: JudgedMessage, message: Message, now: float
+    ) -> list[GuardEvent]:
         """Judge when a message that was taken came; return which edges it brings to life."""
         if not judged.children:
             return []
-        return self.live.arrived(judged.children, now, self._judge_stamps(judged, message, now))
+        return self.live.note_arrivals(
+            judged.children, now, self._judge_stamps(judged, message, now)
+        )
 
     def admits(self, message: Message, now: float) -> frozenset[tuple[str, str]] | None:
         """Return which edges of the message may pass in a strict plan; None: all."""
@@ -185,7 +189,7 @@ class Judge:
         """Return whether the publisher has published more undeclared edges than are judged."""
         return gid in self.ledger.flooders
 
-    def flooded_by(self, gid: bytes | None, transforms: int, now: float) -> None:
+    def report_flood(self, gid: bytes | None, transforms: int, now: float) -> None:
         """Take a message from a publisher with more undeclared edges than are judged."""
         self.ledger.count_flood(gid, transforms, now)
 
@@ -199,7 +203,9 @@ class Judge:
         events += self._publishers.floods(self._senders, self.ledger.flooders, now)
         if self._start.cleared is not None:
             over = self.ledger.over(now)
-            replaced = self._publishers.replaced(self._senders, self.live.partly_missing(), now)
+            replaced = self._publishers.report_replaced(
+                self._senders, self.live.partly_missing(), now
+            )
             silence = self.live.judge(now, self.clocks.speed(now), paused=self.clocks.stands(now))
             return [*events, *silence, *replaced, *over]
         self.live.tick(now)
@@ -281,7 +287,7 @@ class Judge:
         return [
             event
             for children in self.ledger.recheck(now)
-            for event in self.live.arrived(children, now)
+            for event in self.live.note_arrivals(children, now)
         ]
 
     def _judge_stamps(self, judged: JudgedMessage, message: Message, now: float) -> float | None:

@@ -148,7 +148,7 @@ class Ledger:
         self._know_processes(plan)
         self.planned = {edge.child: edge for edge in plan.edges}
         for entry in self.entries.values():
-            entry.fault = self._as_planned(entry.fault)
+            entry.fault = self._replan_fault(entry.fault)
         self.epoch += 1  # verdicts that are remembered hold edges
 
     # Messages.
@@ -183,7 +183,7 @@ class Ledger:
         unplanned = {child for _, child in message.edges} - self.planned.keys()
         left = MOST_UNDECLARED - self._count_undeclared(message.gid) if unplanned else 0
         for parent, child in dict.fromkeys(message.edges):
-            if child in unplanned and not self._plan.may_be_undeclared(parent, child):
+            if child in unplanned and not self._plan.allows_undeclared(parent, child):
                 left -= 1
                 if left < 0:
                     continue
@@ -308,7 +308,7 @@ class Ledger:
     ) -> Fault | None:
         gid, parent, child, static = sent
         self.epoch += self.frames.attach(parent, child, now, static=static)
-        is_undeclared = not self._plan.may_be_undeclared(parent, child)
+        is_undeclared = not self._plan.allows_undeclared(parent, child)
         loop = self.frames.loop(parent, child, now)
         is_ours = any(self.frames.is_planned(*edge) for edge in pairwise(loop))
         fault = Fault(faults.UNDECLARED, parent, child, nodes=nodes, static=static, edge=None)
@@ -440,10 +440,10 @@ class Ledger:
         for hexed, known in memory.items():
             gid = bytes.fromhex(hexed) or None
             for fault in known:
-                entry = OpenFault(self._as_planned(fault), gid, until, until, reported=True)
+                entry = OpenFault(self._replan_fault(fault), gid, until, until, reported=True)
                 self.entries[self._key(fault, gid)] = entry
 
-    def _as_planned(self, fault: Fault) -> Fault:
+    def _replan_fault(self, fault: Fault) -> Fault:
         """Return a fault that was found under another plan with the edge of this one."""
         return replace(fault, edge=self.planned.get(fault.child)) if fault.edge else fault
 
@@ -502,11 +502,11 @@ class Ledger:
         )
         was_first = any(self._was_first(entry, now) for entry in entries)
         if run:
-            found = faults.other_robot_finding(known, run, self._plan)
-            return Taken(found) if was_first else FindingShown(found)
+            finding = faults.other_robot_finding(known, run, self._plan)
+            return Taken(finding) if was_first else FindingShown(finding)
         if was_first:
             return Taken(faults.taken_finding(group))
-        found, first = fault_finding(group), known[0]
+        finding, first = fault_finding(group), known[0]
         notes = []
         if self._says_fate(first):
             fates = dict.fromkeys(map(self._senders.is_held_back, publishers))
@@ -514,7 +514,7 @@ class Ledger:
         offender = process if process in self._stoppable and first.code in _STOPPED_FOR else ""
         if not offender and self._may_be_ours(first):
             notes += [Note("it is not proven which process did it: none is stopped")]
-        return FindingShown(replace(found, notes=(*found.notes, *notes)), offender)
+        return FindingShown(replace(finding, notes=(*finding.notes, *notes)), offender)
 
     def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
         """Report edges again whose publishers have changed."""
@@ -529,8 +529,8 @@ class Ledger:
             who = entries[0].fault.who
             ended = dict.fromkeys(where for entry in entries for where in left[entry.fault.ends])
             notes = [Note(f"{who} has ended, which ran {where}") for where in ended]
-            found = replace(event.found, notes=(*event.found.notes, *notes))
-            yield FindingShown(found, event.process if isinstance(event, FindingShown) else "")
+            finding = replace(event.found, notes=(*event.found.notes, *notes))
+            yield FindingShown(finding, event.process if isinstance(event, FindingShown) else "")
 
     def _over_texts(self, group: Group) -> list[str]:
         robot = group[1] if group[0] == OTHER_ROBOT else ""
@@ -598,7 +598,7 @@ class Ledger:
         fault = entry.fault
         if not fault.alternates or not self._senders.is_sure(entry.gid):
             return [entry.gid]
-        return [*self._senders.named(fault.nodes, static=fault.static)] or [entry.gid]
+        return [*self._senders.publishers_of(fault.nodes, static=fault.static)] or [entry.gid]
 
     def _process_of(self, gid: bytes | None) -> str | bytes:
         """Return the identity of the publisher's process."""

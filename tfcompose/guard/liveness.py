@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.guard.verdict.rates import owner_left, silent, slow
 from tfcompose.model.messages import (
     FindingShown,
@@ -88,7 +88,7 @@ class WatchedTime:
     _ticked: float | None = None
     _catching_up_until: float = 0.0
 
-    def at(self, now: float) -> float:
+    def time_at(self, now: float) -> float:
         """Return the seconds until ``now``."""
         if self._ticked is None or now < self._catching_up_until:
             return self._seconds
@@ -110,7 +110,7 @@ class WatchedTime:
         """Note that the guard runs now, and return the seconds until then."""
         if self._ticked is not None and now - self._ticked > STALLED_S:
             self._catching_up_until = now + CATCH_UP_S
-        self._seconds, self._ticked = self.at(now), now
+        self._seconds, self._ticked = self.time_at(now), now
         return self._seconds
 
 
@@ -148,7 +148,7 @@ class Track:
         if not self.arrivals.count:
             self.forget()
 
-    def arrived(self, watched: float, now: float, *, late: bool = False) -> None:
+    def note_arrival(self, watched: float, now: float, *, late: bool = False) -> None:
         """Note an arrival; two arrivals close together end an edge's silence.
 
         ``late`` says that it may have waited: it tells nothing of the rate.
@@ -158,7 +158,9 @@ class Track:
         self.last, self.heard = now, watched
         if after is not None:
             at_ns = int(watched * 1e9)
-            self.arrivals.resumed(at_ns) if late else self.arrivals.arrived(at_ns, None)
+            self.arrivals.note_resumption(at_ns) if late else self.arrivals.note_arrival(
+                at_ns, None
+            )
 
     def forget(self) -> None:
         """Take the next arrival as the first one."""
@@ -201,7 +203,7 @@ class WrongEdges:
     finding_of: Callable[[Sequence[PlanEdge]], Finding]
 
     @property
-    def found(self) -> Finding:
+    def finding(self) -> Finding:
         """The finding."""
         return self.finding_of(self.edges)
 
@@ -297,15 +299,15 @@ class Liveness:
     def _planned_children(self, children: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(child for child in children if child in self._track_of)
 
-    def arrived(
+    def note_arrivals(
         self, children: tuple[str, ...], now: float, delay_s: float | None = None
     ) -> list[GuardEvent]:
         """Take edges that owners sent in one message; return the events that follow."""
-        watched, late, events = self._watched.at(now), self._watched.is_behind(now), []
+        watched, late, events = self._watched.time_at(now), self._watched.is_behind(now), []
         for track in self._of_message.get(children) or self._part_tracks(children):
             if track.edge.owner in self._absent:
                 continue
-            track.arrived(watched, now, late=late)
+            track.note_arrival(watched, now, late=late)
             track.delay_s = delay_s
             if not track.live:
                 track.live = True
@@ -370,7 +372,7 @@ class Liveness:
         """Return whether messages that arrive now may have waited for the guard."""
         return self._watched.is_behind(now)
 
-    def lost(self, now: float) -> None:
+    def note_lost_messages(self, now: float) -> None:
         """Note lost messages: until they are sent again, no owner counts as silent."""
         self._watched.begins_late(now + CATCH_UP_S)
 
@@ -408,12 +410,12 @@ class Liveness:
                 events.append(_recovery_event(change, self._in_order(tracks), now))
             else:
                 self._note_wrong(wrong)
-                events.append(FindingShown(wrong.found))
+                events.append(FindingShown(wrong.finding))
         return events
 
     def wrong(self) -> list[Finding]:
         """Return the open findings about silent and slow edges."""
-        return [reported.found for reported in dict.fromkeys(self._wrong.values())]
+        return [reported.finding for reported in dict.fromkeys(self._wrong.values())]
 
     def _note_wrong(self, reported: WrongEdges) -> None:
         self._wrong.update({edge.child: reported for edge in reported.edges})
@@ -458,7 +460,7 @@ class Liveness:
                 self._gone.add(owner)
                 wrong = WrongEdges([edge for track in tracks for edge in track.edges], owner_left)
                 self._note_wrong(wrong)
-                events.append(FindingShown(wrong.found))
+                events.append(FindingShown(wrong.finding))
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
                 self._note_over(_children(tracks))
@@ -483,7 +485,7 @@ def _wrong(change: str, tracks: list[Track], now: float) -> WrongEdges | None:
 def _recovery_event(change: str, tracks: list[Track], now: float) -> RecoveredShown:
     """Return the event for tracks that came back, or come at their rate again."""
     edges = [edge for track in tracks for edge in track.edges]
-    named, are = listed([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
+    named, are = list_names([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
     if change == "back":
         silence_s = now - min(track.silent_since for track in tracks)
         return RecoveredShown(f"{named} {are} back after {silence_s:.1f} s")

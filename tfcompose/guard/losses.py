@@ -49,7 +49,7 @@ class LossWatch:
         if lost:
             self._over_at = now + OVER_S
             for judge in self._judges:
-                judge.live.lost(now)
+                judge.live.note_lost_messages(now)
             widen_buffers()  # the limit may be higher now
             if not self._wrong:
                 self._wrong = [datagrams_lost(lost, buffer_limit())]

@@ -173,7 +173,7 @@ class TopicWatch:
         strangers = self._take(fenced, now)  # first: it is passed on
         public = list(self.data.take_public())
         if len(fenced if self.relay else public) >= DEEP:  # of the owners' some may be lost
-            self.judge.live.lost(now)
+            self.judge.live.note_lost_messages(now)
         self._number_taken = len(fenced) + len(public)
         if self._by_partition:
             self._graph.hear_public(
@@ -217,14 +217,14 @@ class TopicWatch:
     def _judge(self, read: Iterable[tuple[JudgedMessage, Message]], now: float) -> None:
         """Judge when messages came, after all of them are passed on."""
         for judged, message in read:
-            self._pass_on(self.judge.arrived(judged, message, now))
+            self._pass_on(self.judge.judge_arrival(judged, message, now))
 
     def _take_one(self, data: TFData, now: float) -> Iterator[tuple[JudgedMessage, Message]]:
         """Take a message; long or unfamiliar ones from a flooding publisher are read in parts."""
         received, judge = data.received, self.judge
         number = number_of_transforms(received.data)
         if number > self._most or judge.is_flooded_by(received.gid):
-            judge.flooded_by(received.gid, number, now)
+            judge.report_flood(received.gid, number, now)
             if not self._decoder.knows(received.data):
                 self._flood.add(data)
                 return
@@ -334,7 +334,7 @@ def together(
     """
     waiting = {Clear: len(plans), TreeComplete: sum(bool(plan.edges) for plan in plans)}
 
-    def passed_on(event: GuardEvent) -> None:
+    def pass_on(event: GuardEvent) -> None:
         if isinstance(event, TreeComplete):
             waiting[TreeComplete] -= event.edges > 0
             if waiting[TreeComplete] == 0 and event.edges:
@@ -346,7 +346,7 @@ def together(
                 return
         emit(event)
 
-    return passed_on
+    return pass_on
 
 
 DEFAULT_SETTLE_S = 0.5

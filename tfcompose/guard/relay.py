@@ -192,7 +192,7 @@ class Relay:
     def _feed(feedback: Feedback, sent: TFData, message: Message) -> None:
         if message.static:
             found = {t.child: t for t in decode(sent.received.data)}
-            feedback.fixed(sent.received.raw_gid or b"", found, "")
+            feedback.latch_fixed(sent.received.raw_gid or b"", found, "")
         else:
             feedback.moving(sent.received.data, "")
 
@@ -215,7 +215,7 @@ class Relay:
         latched.data = data if is_all else encode(list(latched.edges.values()))
         latched.publisher.publish(latched.data)
         if self._feedback:
-            self._feedback.fixed(gid, latched.edges, process)
+            self._feedback.latch_fixed(gid, latched.edges, process)
         self.changes += 1
 
     def _new(self, gid: bytes, process: str) -> _Latched:
@@ -309,7 +309,7 @@ class Feedback:
             if listener.moving and process != sender:
                 listener.moving.publish(data)
 
-    def fixed(self, source: bytes, edges: Mapping[str, SentTransform], sender: str) -> None:
+    def latch_fixed(self, source: bytes, edges: Mapping[str, SentTransform], sender: str) -> None:
         """Latch the fixed edges of one source, by their child, at the next update."""
         known = self._fixed.pop(source, (sender, {}))[1]  # the newest comes last
         self._fixed[source] = (sender, {**known, **edges})

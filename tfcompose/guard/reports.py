@@ -9,9 +9,9 @@ from tfcompose.guard.verdict.publishers import (
     best_effort_publisher,
     flood,
     leak,
-    replaced_latched,
-    unfenced,
-    unmarked,
+    replaced_latched_finding,
+    unfenced_finding,
+    unmarked_finding,
     volatile_publisher,
 )
 from tfcompose.model.messages import FindingShown, Unfenced
@@ -168,9 +168,11 @@ class PublisherReports:
         """Return the finding for one of these; the fence may be of remappings."""
         topic = publisher.topic or GLOBAL[publisher.static]
         if publisher.unmarked:
-            found = unmarked(publisher.node or "", topic, publisher.where, remapped=remapped)
+            finding = unmarked_finding(
+                publisher.node or "", topic, publisher.where, remapped=remapped
+            )
         else:
-            found = unfenced(
+            finding = unfenced_finding(
                 publisher.node or "",
                 publisher.process,
                 topic,
@@ -180,7 +182,7 @@ class PublisherReports:
         process = "" if publisher.unmarked else publisher.process
         return [
             Unfenced(new.found, process, publisher.unmarked)
-            for new in self._once(publisher, found)
+            for new in self._once(publisher, finding)
         ]
 
     def floods(
@@ -218,7 +220,7 @@ class PublisherReports:
             )
         ]
 
-    def replaced(
+    def report_replaced(
         self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float
     ) -> list[FindingShown]:
         """Return the findings for nodes that sent latched messages before they were first heard.
@@ -232,7 +234,9 @@ class PublisherReports:
                 continue
             first = sender.first_sequence
             if 1 < first < UNCOUNTED and now - sender.first_received >= ALL_HEARD_S:
-                found += self._once(publisher, replaced_latched(publisher.node, first - 1, edges))
+                found += self._once(
+                    publisher, replaced_latched_finding(publisher.node, first - 1, edges)
+                )
         return found
 
     def memory(self) -> tuple[tuple[str, str], ...]:
@@ -246,10 +250,10 @@ class PublisherReports:
     def _is_known(self, code: str, publisher: Publisher) -> bool:
         return (code, publisher.gid) in self._reported
 
-    def _once(self, publisher: Publisher, found: Finding) -> list[FindingShown]:
-        if self._is_known(found.code, publisher):
+    def _once(self, publisher: Publisher, finding: Finding) -> list[FindingShown]:
+        if self._is_known(finding.code, publisher):
             return []
-        self._reported[found.code, publisher.gid] = None
+        self._reported[finding.code, publisher.gid] = None
         if len(self._reported) > MOST_REPORTED:
             del self._reported[next(iter(self._reported))]
-        return [FindingShown(found)]
+        return [FindingShown(finding)]

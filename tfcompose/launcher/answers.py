@@ -125,13 +125,13 @@ def _update(
     if state.stop:
         return Refusal("everything is being stopped"), None, None
     try:
-        commands, found = commands_of(
+        commands, findings = commands_of(
             plan, plan.managed, file, base, environment, Path(request.base)
         )
     except ValueError as error:  # a NUL in the folder's name
         return Refusal(f"{request.base!r} cannot be used: {error}"), None, None
-    if found:
-        return Refusal("; ".join(finding.message for finding in found)), None, None
+    if findings:
+        return Refusal("; ".join(finding.message for finding in findings)), None, None
     different = change(state.plan, plan_file.parent, plan, file.parent)
     names, before = (
         [process.name for process in plan.processes],
@@ -201,8 +201,8 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDiff
         if other is None:
             continue
         files = (_bytes(old_folder, other.params_file), _bytes(new_folder, process.params_file))
-        same = old.started_with(other) == new.started_with(process)
-        if same and _only_described(*files):
+        same = old.start_settings(other) == new.start_settings(process)
+        if same and _differ_only_in_description(*files):
             redescribed.add(process.name)
         elif not same or files[0] != files[1] or (described and new.describes(process)):
             changed.add(process.name)
@@ -213,7 +213,7 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDiff
 _DESCRIPTION = re.compile(rb'^ +"robot_description": "[^\n]*"$', re.MULTILINE)
 
 
-def _only_described(before: bytes | None, after: bytes | None) -> bool:
+def _differ_only_in_description(before: bytes | None, after: bytes | None) -> bool:
     """Return whether two parameter files differ in the robot's description only.
 
     Robot_state_publisher takes that while it runs. It never forgets a fixed frame; but for one

@@ -123,7 +123,7 @@ class Children:
             return StartFailed(process.name, _reason(error))
         finally:
             if guard:
-                guard.handed_over()
+                guard.close_guard_ends()
         if guard:
             self._guard, self._guard_pipes = process.name, guard
             self._watch(
@@ -386,7 +386,7 @@ class GuardPipes:
             self.theirs += (memory_fd,)
             self.env[MEMORY_FD] = str(memory_fd)
 
-    def handed_over(self) -> None:
+    def close_guard_ends(self) -> None:
         """Close the guard's ends."""
         for fd in self.theirs:
             os.close(fd)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tfcompose.launcher.state import State, Tracked, Transition
 
 
-def component_answered(step: Transition, event: ComponentState) -> None:
+def take_component_answer(step: Transition, event: ComponentState) -> None:
     """Take what a container has answered to the last order about a component."""
     tracked, why = step.state.tracked[event.process], event.why
     match event.state:

@@ -53,24 +53,24 @@ class Client:
 
 
 @contextlib.contextmanager
-def _at(place: RuntimeDir) -> Iterator[str]:
+def _at(runtime_dir: RuntimeDir) -> Iterator[str]:
     """Give the socket's address: a short one, because Linux takes only 107 bytes."""
-    folder = os.open(place.folder, os.O_DIRECTORY | os.O_RDONLY)
+    folder = os.open(runtime_dir.folder, os.O_DIRECTORY | os.O_RDONLY)
     try:
-        yield f"{procfs.descriptor(folder)}/{place.socket.name}"
+        yield f"{procfs.descriptor(folder)}/{runtime_dir.socket.name}"
     finally:
         os.close(folder)
 
 
-def listen(place: RuntimeDir) -> socket.socket:
+def listen(runtime_dir: RuntimeDir) -> socket.socket:
     """Return the listening socket of a robot whose lock this process holds.
 
     One that was left there is replaced.
     """
     with contextlib.suppress(FileNotFoundError):
-        place.socket.unlink()
+        runtime_dir.socket.unlink()
     listener = socket.socket(socket.AF_UNIX)
-    with _at(place) as address:
+    with _at(runtime_dir) as address:
         before = os.umask(0o177)
         try:
             listener.bind(address)
@@ -81,17 +81,17 @@ def listen(place: RuntimeDir) -> socket.socket:
     return listener
 
 
-def connect(place: RuntimeDir) -> socket.socket:
+def connect(runtime_dir: RuntimeDir) -> socket.socket:
     """Return a connection to whoever runs the robot.
 
     Raises:
         OSError: if no launcher does, or it was stopped (by Ctrl-Z) and cannot answer.
     """
-    _ensure_it_runs(place)
+    _ensure_it_runs(runtime_dir)
     connection = socket.socket(socket.AF_UNIX)
     connection.settimeout(ANSWER_S)
     try:
-        with _at(place) as address:
+        with _at(runtime_dir) as address:
             connection.connect(address)
     except BaseException:
         connection.close()
@@ -107,8 +107,8 @@ def _is_suspended(pid: int) -> bool:
         return False
 
 
-def _ensure_it_runs(place: RuntimeDir) -> None:
-    holder = place.holder()
+def _ensure_it_runs(runtime_dir: RuntimeDir) -> None:
+    holder = runtime_dir.holder()
     if holder is None:
         return
     if _is_suspended(holder.pid):
@@ -117,14 +117,14 @@ def _ensure_it_runs(place: RuntimeDir) -> None:
         )
 
 
-def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
+def ask(runtime_dir: RuntimeDir, request: Request, answer: type[A]) -> A:
     """Return the launcher's answer to one request, of the class that answers it.
 
     Raises:
         RefusedError: with the launcher's reason, if it does not do it.
         OSError: if no launcher runs the robot, or it does not answer.
     """
-    with connect(place) as connection:
+    with connect(runtime_dir) as connection:
         connection.sendall(line_of(request))
         with connection.makefile("rb") as lines:
             line = lines.readline()

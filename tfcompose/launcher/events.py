@@ -146,7 +146,7 @@ class NotifyLate:
     """Report that a process is not ready in time, with the last lines of its log."""
 
     name: str
-    found: Finding
+    finding: Finding
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,9 +50,9 @@ def command_of(argv: Sequence[str], base: Mapping[str, str]) -> ChildCommand | i
     # What is sent in a partition is known to be ours by the launcher's run; topics of each
     # process's own need none.
     plan = replace(plan, guard=replace(plan.guard, fence="remap"))
-    commands, found = commands_of(plan, [process], file, base, child_environment)
-    if found:
-        return _fail("\n".join(map(_text, found)), 1)
+    commands, findings = commands_of(plan, [process], file, base, child_environment)
+    if findings:
+        return _fail("\n".join(map(_text, findings)), 1)
     # No launcher holds the others back until the guard has looked: it takes every owner as the
     # plan's.
     joins = {JOINS: "1"} if process.kind == "guard" else {}
@@ -73,12 +73,12 @@ def main(argv: Sequence[str]) -> int:
         return _fail(f"{argv[1]} cannot be started: {error}", 1)
 
 
-def _text(found: Finding) -> str:
+def _text(finding: Finding) -> str:
     return "\n".join(
         [
-            found.message,
-            *(f"  {note.message}" for note in found.notes),
-            *([found.help] if found.help else []),
+            finding.message,
+            *(f"  {note.message}" for note in finding.notes),
+            *([finding.help] if finding.help else []),
         ]
     )
 

@@ -6,7 +6,7 @@ import signal
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 
 if TYPE_CHECKING:
     from tfcompose.launcher.events import Exited
@@ -26,23 +26,25 @@ def signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def how_ended(returncode: int) -> str:
+def describe_exit(returncode: int) -> str:
     """Return an exit code, or minus a signal's number, in words: "exit code 3", "SIGSEGV"."""
     return signal_name(-returncode) if returncode < 0 else f"exit code {returncode}"
 
 
-def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str, ...]) -> Finding:
+def ended_by_itself_finding(
+    name: str, returncode: int, when: str, last_lines: tuple[str, ...]
+) -> Finding:
     """Return the finding for a process that should not have ended; ``when`` ends the sentence."""
     verb = "was ended by" if returncode < 0 else "ended with"
     notes = [Note(f"{name}: {line}") for line in last_lines]
-    return finding("TF808", f"{name} {verb} {how_ended(returncode)}{when}", None, notes=notes)
+    return finding("TF808", f"{name} {verb} {describe_exit(returncode)}{when}", None, notes=notes)
 
 
 def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
     """Return the finding for a guard that ended while the others run, and is started again."""
     verb = "was ended by" if event.returncode < 0 else "ended with"
     blind = "no edge of the plan reaches /tf" if strict else "the tree is not watched"
-    message = f"{name} {verb} {how_ended(event.returncode)}: {blind} until it is back"
+    message = f"{name} {verb} {describe_exit(event.returncode)}: {blind} until it is back"
     notes = [Note(f"{name}: {line}") for line in event.last_lines]
     advice = "it is restarted, and repeats no report"
     return finding("TF808", message, None, severity="warning", notes=notes, help=advice)
@@ -57,7 +59,7 @@ def guard_hangs(name: str, seconds: float, *, strict: bool) -> Finding:
     )
 
 
-def not_started(name: str, why: str) -> Finding:
+def not_started_finding(name: str, why: str) -> Finding:
     """Return the finding for a process that the operating system would not start."""
     return finding("TF808", f"{name} could not be started: {why}", None)
 
@@ -82,9 +84,9 @@ def never_clear(name: str, seconds: float) -> Finding:
     )
 
 
-def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
+def never_published_finding(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
     """Return the finding for the edges of one owner that were not published in time."""
-    names = listed((edge.name for edge in edges), NAMED_AT_MOST)
+    names = list_names((edge.name for edge in edges), NAMED_AT_MOST)
     name = owner.process.name
     if owner.state == "stopped" and owner.order == 0:
         waits = " and ".join(

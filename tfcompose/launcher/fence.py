@@ -79,7 +79,7 @@ def remap_tf(plan: Plan, process: PlanProcess) -> PlanProcess:
     )
 
 
-def not_remapped(plan: Plan) -> list[Finding]:
+def find_not_remapped(plan: Plan) -> list[Finding]:
     """Return a finding for the owners that no remapping reaches."""
     missed = [
         process.name
@@ -168,10 +168,10 @@ def _refuse_own_profile(process: PlanProcess, command: ChildCommand) -> None:
 
     It would leave the fence.
     """
-    found = next(filter(None, map(_LEAVES.search, command.argv)), None) if process.owns else None
-    if found is None:
+    match = next(filter(None, map(_LEAVES.search, command.argv)), None) if process.owns else None
+    if match is None:
         return
-    variable, file = found[1], (found["file"] or "").strip("\"'")
+    variable, file = match[1], (match["file"] or "").strip("\"'")
     message = (
         f"guard: strict cannot separate a command that sets {variable}"
         f" itself{f', to {file}' if file else ''}"

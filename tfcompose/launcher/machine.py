@@ -15,7 +15,7 @@ from signal import SIGKILL
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Note
-from tfcompose.launcher.components import component_answered, order_components
+from tfcompose.launcher.components import order_components, take_component_answer
 from tfcompose.launcher.events import (
     Begin,
     Event,
@@ -27,7 +27,7 @@ from tfcompose.launcher.events import (
     Started,
     StartFailed,
 )
-from tfcompose.launcher.failures import guard_hangs, never_clear, not_started
+from tfcompose.launcher.failures import guard_hangs, never_clear, not_started_finding
 from tfcompose.launcher.readiness import (
     check_gates,
     gate_of,
@@ -42,16 +42,16 @@ from tfcompose.launcher.readiness import (
 from tfcompose.launcher.state import StopReason, Transition, by_owner
 from tfcompose.launcher.stopping import (
     backoff_s,
-    description_answered,
     edge_taken,
     firmer_at,
     follow_plan,
     order_descriptions,
-    process_exited,
-    process_requested,
     refusal,
     send_due_signals,
     stop_if_requested,
+    take_description_answer,
+    take_process_exit,
+    take_process_request,
 )
 from tfcompose.model.messages import (
     Absent,
@@ -125,16 +125,16 @@ def _react(step: Transition, event: Event) -> None:
         case Started(name, pid):
             _take_start(step, name, pid)
         case StartFailed(name, why):
-            _not_started(step, name, why)
+            _take_failed_start(step, name, why)
         case Exited():
-            process_exited(step, event)
+            take_process_exit(step, event)
         case ComponentState(name, number):
             if name in step.state.tracked and step.state.tracked[name].order == number:
-                component_answered(step, event)
+                take_component_answer(step, event)
         case DescriptionState(process) if process in step.state.tracked:
-            description_answered(step, event)
-        case Taken(found):
-            edge_taken(step, found)
+            take_description_answer(step, event)
+        case Taken(finding):
+            edge_taken(step, finding)
         case _:
             stop_if_requested(step, event)
             if step.state.stop is None:
@@ -144,7 +144,7 @@ def _react(step: Transition, event: Event) -> None:
 def _take_request_or_report(step: Transition, event: Event) -> None:
     match event:
         case ProcessRequest():
-            process_requested(step, event)
+            take_process_request(step, event)
         case NewPlan():
             follow_plan(step, event)
         case GateState(process, observed, is_open=False) if process in step.state.tracked:
@@ -157,13 +157,13 @@ def _take_request_or_report(step: Transition, event: Event) -> None:
         case OwnerReady(process) if process in step.state.tracked:
             _owner_ready(step, process)
         case _:  # the guard's other events, and Tick
-            _guard_reported(step, event)
+            _take_guard_report(step, event)
 
 
-def _not_started(step: Transition, name: str, why: str) -> None:
+def _take_failed_start(step: Transition, name: str, why: str) -> None:
     tracked = step.state.tracked[name]
     step.enter(name, "fatal", why, order=tracked.order if tracked.began else 0)
-    step.fail_process(name, not_started(name, why))
+    step.fail_process(name, not_started_finding(name, why))
 
 
 def _begin(step: Transition) -> None:
@@ -208,7 +208,7 @@ def _introduce(step: Transition, owner: Tracked) -> None:
 # What the guard reports.
 
 
-def _guard_reported(step: Transition, event: Event) -> None:
+def _take_guard_report(step: Transition, event: Event) -> None:
     match event:
         case Alive():
             step.update(guard_alive=step.now, guard_overdue=None)
@@ -221,10 +221,10 @@ def _guard_reported(step: Transition, event: Event) -> None:
             step.update(silent=silent.difference(children) if over else silent.union(children))
         case TreeComplete(edges):
             _complete(step, edges)
-        case FindingShown(found, process):
-            _violation(step, found, process)
-        case Unfenced(found, process, pid):
-            _left_the_fence(step, found, process or _process_of(step.state, pid), pid)
+        case FindingShown(finding, process):
+            _violation(step, finding, process)
+        case Unfenced(finding, process, pid):
+            _report_left_fence(step, finding, process or _process_of(step.state, pid), pid)
         case RecoveredShown(text):
             step.notify(RecoveredShown(text, step.since_begin))
         case _:
@@ -270,7 +270,7 @@ def _complete(step: Transition, edges: int) -> None:
         step.notify(TreeComplete(edges, step.since_begin))
 
 
-def _violation(step: Transition, found: Finding, process: str) -> None:
+def _violation(step: Transition, finding: Finding, process: str) -> None:
     """Report what the guard found.
 
     By the plan's policy, ``process``, which surely did it, is stopped, or everything.
@@ -278,13 +278,13 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
     ``process`` is empty where it is not sure, or not a process of the plan.
     """
     policy = step.state.plan.guard.on_violation
-    if found.severity == "error" and policy == "stop":
-        step.report(found)
-        step.stop(StopReason("failure", 1), found.label)
-    elif found.severity == "error" and policy == "stop-offender" and process:
-        _stop_offender(step, found, process, "on_violation is stop-offender")
+    if finding.severity == "error" and policy == "stop":
+        step.report(finding)
+        step.stop(StopReason("failure", 1), finding.label)
+    elif finding.severity == "error" and policy == "stop-offender" and process:
+        _stop_offender(step, finding, process, "on_violation is stop-offender")
     else:
-        step.report(found)
+        step.report(finding)
 
 
 def _process_of(state: State, pid: int) -> str:
@@ -293,33 +293,34 @@ def _process_of(state: State, pid: int) -> str:
     return next(started, "")
 
 
-def _left_the_fence(step: Transition, found: Finding, process: str, pid: int) -> None:
+def _report_left_fence(step: Transition, finding: Finding, process: str, pid: int) -> None:
     """Report a process that bypasses a strict plan's filter, and stop it by policy.
 
     ``process`` is empty where one of the plan's started ``pid``, and nothing says which.
     """
     if step.state.plan.guard.on_violation == "stop":
-        _violation(step, found, process)
+        _violation(step, finding, process)
     elif not process:
         step.report(
             _with_note(
-                found, f"nothing is stopped: a process of the plan started it; kill {pid} ends it"
+                finding,
+                f"nothing is stopped: a process of the plan started it; kill {pid} ends it",
             )
         )
     else:
-        _stop_offender(step, found, process, "guard is strict")
+        _stop_offender(step, finding, process, "guard is strict")
 
 
-def _stop_offender(step: Transition, found: Finding, process: str, because: str) -> None:
+def _stop_offender(step: Transition, finding: Finding, process: str, because: str) -> None:
     if why := refusal(step.state, process, "stop"):
-        step.report(_with_note(found, f"nothing is stopped: {why}"))
+        step.report(_with_note(finding, f"nothing is stopped: {why}"))
         return
-    step.report(_with_note(found, f"{process} is stopped and not restarted: {because}"))
-    process_requested(step, ProcessRequest("stop", process))
+    step.report(_with_note(finding, f"{process} is stopped and not restarted: {because}"))
+    take_process_request(step, ProcessRequest("stop", process))
 
 
-def _with_note(found: Finding, text: str) -> Finding:
-    return replace(found, notes=(*found.notes, Note(text)))
+def _with_note(finding: Finding, text: str) -> Finding:
+    return replace(finding, notes=(*finding.notes, Note(text)))
 
 
 # A watchdog over the guard: one that hangs is ended, and started again like one that dies. It

@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Protocol
 from tfcompose.foundation import procfs
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.hooks import run_hook
-from tfcompose.foundation.tool import installed
+from tfcompose.foundation.tool import installed_tools
 from tfcompose.launcher.child import ChildCommand
-from tfcompose.launcher.fence import by_partition, not_remapped, remap_tf, way_of
+from tfcompose.launcher.fence import by_partition, find_not_remapped, remap_tf, way_of
 from tfcompose.launcher.kernel_settings import check_settings
 from tfcompose.launcher.program import HERE, without_current_folder
 from tfcompose.model.plan import PROGRAM
@@ -74,14 +74,14 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
     """
     folder = built_in or plan_file.absolute().parent
-    found = [*_never_started(plan), *_check_by_tools(plan)]
+    findings = [*_never_started(plan), *_check_by_tools(plan)]
     commands: dict[str, ChildCommand] = {}
     missing = []
     way = way_of(plan, base)
     if way == "remap":
-        found += not_remapped(plan)
+        findings += find_not_remapped(plan)
         processes = [remap_tf(plan, process) for process in processes]
-    found += _not_loadable(plan, processes)
+    findings += _not_loadable(plan, processes)
     for process in processes:
         if process.component:
             fill = partial(_fill, process=process, plan_file=plan_file, build_dir=folder)
@@ -90,21 +90,21 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
             continue
         command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
         if isinstance(command, Finding):
-            found.append(command)
+            findings.append(command)
         elif isinstance(command, NotFound):
             missing.append(command)
         else:
             commands[process.name] = command
-            found += [] if command.missing else check_settings(process)
+            findings += [] if command.missing else check_settings(process)
     if way == "partition":
         commands, wrong = by_partition(plan, commands, plan_file.absolute().parent)
-        found += wrong
+        findings += wrong
     elif way == "remap":
         guards = {process.name for process in processes if process.kind == "guard"}
         commands |= {name: _with_mark(commands[name]) for name in guards & commands.keys()}
     if missing:
-        found.append(not_found(missing))
-    return commands, list(dict.fromkeys(found))
+        findings.append(not_found(missing))
+    return commands, list(dict.fromkeys(findings))
 
 
 def _command_of(
@@ -166,7 +166,7 @@ def _check_by_tools(plan: Plan) -> Iterator[Finding]:
         if process.kind == "run" and process.argv[:1] == (PROGRAM,)
     }
     wanted = commands | {("key", name) for name in plan.sections}
-    for tool in installed().tools if wanted else ():
+    for tool in installed_tools().tools if wanted else ():
         if tool.preflight and not wanted.isdisjoint(tool.names()):
             found = run_hook(tool.preflight, tool.name, None, plan)
             yield from [found] if isinstance(found, Finding) else found
@@ -179,18 +179,18 @@ def _with_mark(guard: ChildCommand) -> ChildCommand:
 def _never_started(plan: Plan) -> list[Finding]:
     """Return a finding for each process that waits for what cannot come."""
     known = {process.name: process for process in plan.processes}
-    found = []
+    findings = []
     for process in plan.processes:
         for name, what in process.after.items():
             if name not in known:
-                found.append(
+                findings.append(
                     finding(
                         "TF902", f"{process.name} waits for {name}, which is not in the plan", None
                     )
                 )
             elif what == "done" and known[name].kind != "run":
                 message = f"{process.name} waits until {name} is {what}, which never happens"
-                found.append(finding("TF902", message, None))
+                findings.append(finding("TF902", message, None))
     waiting = {
         process.name: set(process.after) & set(known)
         for process in plan.processes
@@ -200,8 +200,8 @@ def _never_started(plan: Plan) -> list[Finding]:
         for name in free:
             del waiting[name]
     if waiting:
-        found.append(finding("TF812", f"{', '.join(waiting)} wait for each other", None))
-    return found
+        findings.append(finding("TF812", f"{', '.join(waiting)} wait for each other", None))
+    return findings
 
 
 def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]:
@@ -263,7 +263,7 @@ def _fill(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | No
     }
     if process.params_file is not None:
         values["params_file"] = str(plan_file.parent / process.params_file)
-    return _PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), text)
+    return _PLACEHOLDER.sub(lambda match: values.get(match[1], match[0]), text)
 
 
 @dataclass(frozen=True, slots=True)

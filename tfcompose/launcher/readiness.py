@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, cast
 
 from tfcompose.foundation.findings import Note, finding
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.launcher.events import NotifyLate, Order
 from tfcompose.launcher.failures import waits_in_vain
 from tfcompose.model.messages import AllReady, AllStarted, Gate, ProcessReady, StartRow
@@ -142,9 +142,9 @@ def check_gates(step: Transition) -> None:
             and step.now >= due
         ):
             step.track(name, replace(tracked, late=True))
-            found = _late(step.state, tracked, due - tracked.began)
-            step.update(reported=step.state.reported | {found.code})
-            step.actions.append(NotifyLate(name, found))
+            finding = _late(step.state, tracked, due - tracked.began)
+            step.update(reported=step.state.reported | {finding.code})
+            step.actions.append(NotifyLate(name, finding))
 
 
 def late_at(state: State, tracked: Tracked) -> float | None:
@@ -209,7 +209,7 @@ def waits_for(state: State, tracked: Tracked) -> str:
         "log": f"no line of its output holds {text}",
         "exit": "it still runs",
         "time": f"{ready.number if ready else 0:g} s have not passed",
-        "edges": f"no node published {listed(missing, _NAMED_AT_MOST)}",
+        "edges": f"no node published {list_names(missing, _NAMED_AT_MOST)}",
     }.get(gate_of(tracked.process), "")
 
 

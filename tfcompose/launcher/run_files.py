@@ -31,11 +31,11 @@ class RunFiles:
     in its folder is kept, if that is in the runtime directory.
     """
 
-    def __init__(self, place: RuntimeDir, lock: Lock, plan_file: Path) -> None:
-        self._home = self._place = place
+    def __init__(self, runtime_dir: RuntimeDir, lock: Lock, plan_file: Path) -> None:
+        self._home = self._runtime_dir = runtime_dir
         self._lock = lock
         self._kept: dict[str, bytes] = {}
-        self.listener = self._listen(place)
+        self.listener = self._listen(runtime_dir)
         self.keep(plan_file)
 
     @property
@@ -46,13 +46,13 @@ class RunFiles:
     @property
     def folder(self) -> Path:
         """Where they are now."""
-        return self._place.folder
+        return self._runtime_dir.folder
 
     def keep(self, plan_file: Path) -> None:
         """Keep what belongs to this plan from now on."""
         self.plan_file = plan_file
         folder, self._kept = plan_file.parent, {}
-        if folder.is_relative_to(self._place.folder):
+        if folder.is_relative_to(self._runtime_dir.folder):
             self._kept = {
                 str(file.relative_to(folder)): file.read_bytes()
                 for file in folder.rglob("*")
@@ -67,8 +67,8 @@ class RunFiles:
         Raises:
             OSError: if there is no folder for them.
         """
-        if self._place is not self._home and self._home.folder.parent.parent.is_dir():
-            before = self._place
+        if self._runtime_dir is not self._home and self._home.folder.parent.parent.is_dir():
+            before = self._runtime_dir
             with contextlib.suppress(OSError):
                 self._put(self._home)
                 shutil.rmtree(before.folder, ignore_errors=True)
@@ -85,34 +85,36 @@ class RunFiles:
         folder = self.plan_file.parent
         try:
             return (
-                _identity(self._place.folder / "lock") == _identity(self._lock.fd)
-                and _identity(self._place.socket) == self._socket
+                _identity(self._runtime_dir.folder / "lock") == _identity(self._lock.fd)
+                and _identity(self._runtime_dir.socket) == self._socket
                 and all((folder / name).is_file() for name in self._kept)
             )
         except OSError:
             return False
 
-    def _put(self, place: RuntimeDir) -> None:
-        make_private(place.folder)
-        if not _is_same(place.folder / "lock", self._lock.fd):
-            self._lock.renew(place)
-        if self._place is not place or not self._has_socket(place):
-            self.listener = self._listen(place)
+    def _put(self, runtime_dir: RuntimeDir) -> None:
+        make_private(runtime_dir.folder)
+        if not _is_same(runtime_dir.folder / "lock", self._lock.fd):
+            self._lock.renew(runtime_dir)
+        if self._runtime_dir is not runtime_dir or not self._has_socket(runtime_dir):
+            self.listener = self._listen(runtime_dir)
         if self._kept:
-            folder = place.folder / self.plan_file.parent.relative_to(self._place.folder)
+            folder = runtime_dir.folder / self.plan_file.parent.relative_to(
+                self._runtime_dir.folder
+            )
             for name, data in self._kept.items():
                 _write(folder / name, data)
             self.plan_file = folder / self.plan_file.name
-        self._place = place
+        self._runtime_dir = runtime_dir
 
-    def _listen(self, place: RuntimeDir) -> socket:
-        listener = listen(place)
-        self._socket = _identity(place.socket)
+    def _listen(self, runtime_dir: RuntimeDir) -> socket:
+        listener = listen(runtime_dir)
+        self._socket = _identity(runtime_dir.socket)
         return listener
 
-    def _has_socket(self, place: RuntimeDir) -> bool:
+    def _has_socket(self, runtime_dir: RuntimeDir) -> bool:
         try:
-            return _identity(place.socket) == self._socket
+            return _identity(runtime_dir.socket) == self._socket
         except OSError:
             return False
 

@@ -257,37 +257,39 @@ class Transition:
         else:
             self.actions.append(Start(name))
 
-    def report(self, found: Finding) -> None:
+    def report(self, finding: Finding) -> None:
         """Show the finding, and remember an error."""
-        if found.severity == "error":
-            self.update(reported=self.state.reported | {found.code})
-        self.notify(FindingShown(found))
+        if finding.severity == "error":
+            self.update(reported=self.state.reported | {finding.code})
+        self.notify(FindingShown(finding))
 
-    def fail_process(self, name: str, found: Finding) -> None:
+    def fail_process(self, name: str, finding: Finding) -> None:
         """Report that the process failed for good, and stop everything if it is required."""
         tracked = self.state.tracked[name]
         if tracked.process.required is not False:
-            self.fail(found)
+            self.fail(finding)
         elif self.state.stop is None:
             advice = (
                 f"the robot goes on without it: required is false; tfcompose start {name} tries"
                 " again"
             )
-            self.report(replace(found, severity="warning", help=advice))
+            self.report(replace(finding, severity="warning", help=advice))
             self.track(
                 name,
-                replace(tracked, failed=(found.message, *(note.message for note in found.notes))),
+                replace(
+                    tracked, failed=(finding.message, *(note.message for note in finding.notes))
+                ),
             )
 
-    def fail(self, found: Finding) -> None:
+    def fail(self, finding: Finding) -> None:
         """Report the finding and stop everything.
 
         Does nothing if everything stops already: further failures are consequences.
         """
         if self.state.stop is None:
-            self.report(found)
-            self.update(because=(found.message, *(note.message for note in found.notes)))
-            self.stop(StopReason("failure", 1), found.label)
+            self.report(finding)
+            self.update(because=(finding.message, *(note.message for note in finding.notes)))
+            self.stop(StopReason("failure", 1), finding.label)
 
     def stop(self, stop: StopReason, reason: str) -> None:
         """Begin to stop everything, unless that is under way."""

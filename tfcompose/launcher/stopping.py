@@ -15,10 +15,10 @@ from tfcompose.foundation.findings import did_you_mean
 from tfcompose.foundation.text import plural
 from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp
 from tfcompose.launcher.failures import (
-    ended_by_itself,
+    describe_exit,
+    ended_by_itself_finding,
     guard_lost,
-    how_ended,
-    never_published,
+    never_published_finding,
     signal_name,
 )
 from tfcompose.launcher.state import UNREAD, StopReason, Tracked, by_owner
@@ -52,7 +52,7 @@ def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
 # The end of a process.
 
 
-def process_exited(step: Transition, event: Exited) -> None:
+def take_process_exit(step: Transition, event: Exited) -> None:
     """Take the end of a process: meant, to be followed by a restart, or a failure.
 
     Components go with a container.
@@ -62,13 +62,13 @@ def process_exited(step: Transition, event: Exited) -> None:
 
 
 def _take_end(step: Transition, event: Exited) -> None:
-    name, how = event.name, how_ended(event.returncode)
+    name, how = event.name, describe_exit(event.returncode)
     tracked = step.state.tracked[name]
     if step.state.stop:
         step.enter(name, "stopped", how)
         return
     if name == step.state.guard and step.state.clear is not None and not tracked.leaving:
-        _guard_exited(step, tracked, event)
+        _take_guard_exit(step, tracked, event)
         return
     before = tracked
     lose_edges(step, tracked)
@@ -97,7 +97,9 @@ def _take_end(step: Transition, event: Exited) -> None:
     when = " before it reported whether the plan's edges are published already" if early else ""
     if not done or (process.required and not _is_to_end(step.state, process)):
         when = ", and the plan requires it" if done else when
-        step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))
+        step.fail_process(
+            name, ended_by_itself_finding(name, event.returncode, when, event.last_lines)
+        )
 
 
 def _is_to_end(state: State, process: PlanProcess) -> bool:
@@ -111,7 +113,7 @@ def _is_to_end(state: State, process: PlanProcess) -> bool:
     )
 
 
-def _guard_exited(step: Transition, tracked: Tracked, event: Exited) -> None:
+def _take_guard_exit(step: Transition, tracked: Tracked, event: Exited) -> None:
     """Have a guard that died follow itself.
 
     What it reported holds, and the next one is given its memory.
@@ -186,8 +188,8 @@ def _restart_after(step: Transition, tracked: Tracked, event: Exited) -> None:
     schedule_restart(
         step,
         tracked,
-        how_ended(event.returncode),
-        lambda when: ended_by_itself(event.name, event.returncode, when, event.last_lines),
+        describe_exit(event.returncode),
+        lambda when: ended_by_itself_finding(event.name, event.returncode, when, event.last_lines),
     )
 
 
@@ -241,7 +243,7 @@ def refusal(state: State, name: str, verb: Verb) -> str | None:
     return None
 
 
-def process_requested(step: Transition, request: ProcessRequest) -> None:
+def take_process_request(step: Transition, request: ProcessRequest) -> None:
     """Stop, start or restart one process."""
     if refusal(step.state, request.name, request.do):
         return
@@ -307,7 +309,7 @@ def order_descriptions(step: Transition) -> None:
             step.actions.append(Order(DescriptionOrder(name, node, tracked.description)))
 
 
-def description_answered(step: Transition, event: DescriptionState) -> None:
+def take_description_answer(step: Transition, event: DescriptionState) -> None:
     """Start a process anew that did not take its description."""
     tracked = step.state.tracked[event.process]
     if not tracked.description:
@@ -367,20 +369,20 @@ def _time_up(step: Transition) -> None:
     complete = state.complete or state.guard is None
     if not complete and "TF811" not in state.reported:
         for owner, edges in by_owner(state.awaited):
-            step.report(never_published(state.tracked[owner], edges))
+            step.report(never_published_finding(state.tracked[owner], edges))
     failed = not complete or bool(step.state.reported or state.given_up)
     step.stop(StopReason("time", 1 if failed else 0), "the time is up")
 
 
-def edge_taken(step: Transition, found: Finding) -> None:
+def edge_taken(step: Transition, finding: Finding) -> None:
     """Stop everything, because an edge of the plan is published already.
 
     Each such edge is reported.
     """
     stop = step.state.stop
     if stop is None or stop.cause == "taken":
-        step.report(found)
-        step.stop(StopReason("taken", 1), found.label)
+        step.report(finding)
+        step.stop(StopReason("taken", 1), finding.label)
 
 
 # Which signal is due.

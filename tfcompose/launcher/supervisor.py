@@ -145,9 +145,9 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     ]
     base = os.environ if base_env is None else base_env
     built_in = session.base if session else None
-    commands, found = commands_of(plan, processes, plan_file, base, environment, built_in)
-    if found:
-        for finding in found:
+    commands, findings = commands_of(plan, processes, plan_file, base, environment, built_in)
+    if findings:
+        for finding in findings:
             report(FindingShown(finding))
         report(Ended(1))
         return 1
@@ -218,10 +218,10 @@ class _Supervisor:
             self._notifier.catch_up()
             for key, _ in self._selector.select(self._sleep_s(end)):
                 key.data()
-            for number in self._signals.taken():
+            for number in self._signals.take():
                 self._handle(Signalled(number))
             is_due = time.monotonic() >= self._check_at
-            if self._signals.children_changed() or is_due:
+            if self._signals.take_children_changed() or is_due:
                 self._children.reap()
             if is_due:
                 self._children.find_strays()
@@ -307,8 +307,8 @@ class _Supervisor:
                 self._order_component(order)
             case Order(order):
                 self._children.order(order)
-            case NotifyLate(name, found):
-                self._notify_late(name, found)
+            case NotifyLate(name, finding):
+                self._notify_late(name, finding)
             case Finish(exit_code):
                 self._exit_code = exit_code
             case _:
@@ -385,11 +385,11 @@ class _Supervisor:
     def _writer(self, process: str, line: str) -> str:
         return writer_of(self._state, process, line)
 
-    def _notify_late(self, name: str, found: Finding) -> None:
+    def _notify_late(self, name: str, finding: Finding) -> None:
         component = self._state.tracked[name].process.component
         writes = component.container if component else name
         notes = [Note(f"{writes}: {line}") for line in self._children.last_lines(writes)]
-        self._notify(FindingShown(replace(found, notes=(*found.notes, *notes))))
+        self._notify(FindingShown(replace(finding, notes=(*finding.notes, *notes))))
 
 
 @final
@@ -440,7 +440,7 @@ class Signals:
         with contextlib.suppress(BlockingIOError):
             os.read(self.fd, 4096)
 
-    def taken(self) -> Iterator[int]:
+    def take(self) -> Iterator[int]:
         """Yield the signals that came since the last call, without SIGCHLD."""
         while self._taken:
             number = self._taken.popleft()
@@ -449,7 +449,7 @@ class Signals:
             else:
                 self._children_changed = True
 
-    def children_changed(self) -> bool:
+    def take_children_changed(self) -> bool:
         """Return whether SIGCHLD was among those that ``taken`` has passed since the last call."""
         changed, self._children_changed = self._children_changed, False
         return changed

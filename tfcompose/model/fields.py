@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-def documented(default: Any, about: str, *examples: Any) -> Any:
+def documented_field(default: Any, about: str, *examples: Any) -> Any:
     """Return a field of a dataclass that users write as well.
 
     What an editor and the reference say of the key.

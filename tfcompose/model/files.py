@@ -69,7 +69,7 @@ def _quote_path(path: str) -> str:
     ROS reads addresses with libcurl, which refuses spaces and takes ``#``, ``?`` and ``%`` for
     something else. What it takes as it is stays so, since other readers decode nothing.
     """
-    return _NOT_IN_ADDRESSES.sub(lambda found: f"%{ord(found[0]):02X}", path)
+    return _NOT_IN_ADDRESSES.sub(lambda match: f"%{ord(match[0]):02X}", path)
 
 
 def assets(robot: Robot) -> Iterator[Asset]:
@@ -115,8 +115,8 @@ def with_absolute_addresses(urdf: str, folder: Path) -> str:
     the plan does, so that what is built stays the same everywhere.
     """
 
-    def absolute(found: re.Match[str]) -> str:
-        path = Path(folder, html.unescape(found[3])).resolve()
-        return f"{found[1]}{found[2]}file://{quote(str(path))}{found[2]}"
+    def absolute(match: re.Match[str]) -> str:
+        path = Path(folder, html.unescape(match[3])).resolve()
+        return f"{match[1]}{match[2]}file://{quote(str(path))}{match[2]}"
 
     return _RELATIVE.sub(absolute, urdf)

@@ -219,7 +219,7 @@ def echo_bag(path: str, query: PoseQuery, on_pose: OnPose) -> NoPose | None:
         # The buffer forgets: later on it could only say that this was too long ago.
         if 0 < query.at_ns < replay.newest_ns - CACHE_NS // 2:
             break
-    return replay.ended()
+    return replay.explain_end()
 
 
 class _Replay:
@@ -257,7 +257,7 @@ class _Replay:
         self._next_ns = now_ns + int(_SECOND_NS / query.rate)
         return query.once or query.at_ns > 0
 
-    def ended(self) -> NoPose | None:
+    def explain_end(self) -> NoPose | None:
         """Return None if there was a pose until the end, else why there was none."""
         if self._gave:
             return None

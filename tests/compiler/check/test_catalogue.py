@@ -38,15 +38,15 @@ def test_two_rules_of_one_code_are_refused() -> None:
 
 def test_a_robot_sets_how_much_its_findings_matter() -> None:
     spec = Path(__file__).parent / "specs" / "levels.yaml"
-    found = compile_robot(spec.read_text("utf-8"), spec.name, library()).found
-    assert {one.severity for one in found if one.code == "TF401"} == {"warning"}
-    assert {one.severity for one in found if one.code == "TF101"} == {"error"}
+    findings = compile_robot(spec.read_text("utf-8"), spec.name, library()).findings
+    assert {one.severity for one in findings if one.code == "TF401"} == {"warning"}
+    assert {one.severity for one in findings if one.code == "TF101"} == {"error"}
 
 
 def test_a_finding_of_a_rule_is_at_most_as_severe_as_the_catalogue_says() -> None:
     for spec in SPECS:
         if "\nrules:" not in (text := spec.read_text("utf-8")):
-            found = compile_robot(text, spec.name, library()).found
+            findings = compile_robot(text, spec.name, library()).findings
             assert not [
-                one for one in found if one.severity == "error" != CATALOGUE[one.code].severity
+                one for one in findings if one.severity == "error" != CATALOGUE[one.code].severity
             ], spec

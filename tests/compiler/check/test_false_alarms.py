@@ -17,10 +17,10 @@ FILES = [
 
 
 def findings(text: str, *profiles: str, file: str = "robot.yaml") -> list[str]:
-    found = compile_robot(
+    findings = compile_robot(
         text, file, library(), profiles, read=lambda name: Path(name).read_text("utf-8")
-    ).found
-    return [f"{one.code} {one.message}" for one in found]
+    ).findings
+    return [f"{one.code} {one.message}" for one in findings]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

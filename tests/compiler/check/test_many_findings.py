@@ -14,11 +14,11 @@ from tfcompose.compiler.compile import compile_robot
 def seconds(links: int) -> float:
     lines = "".join(f"  l{at}: {{parent: unknown{at}}}\n" for at in range(links))
     began = time.process_time()
-    found = compile_robot(
+    findings = compile_robot(
         f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{lines}", "r.yaml", library()
-    ).found
+    ).findings
     took = time.process_time() - began
-    assert len([one for one in found if one.code == "TF203"]) == links
+    assert len([one for one in findings if one.code == "TF203"]) == links
     return took
 
 
@@ -36,6 +36,6 @@ def test_fifty_publishers_of_fixed_edges_are_not_yet_too_many(count: int, codes:
         "tfcompose: 1\nrobot: r\nlinks: {base_link:"
         f" {{}}}}\nframes:\n{frames}processes:\n{processes}"
     )
-    assert {one.code for one in compile_robot(text, "r.yaml", library()).found} & {
+    assert {one.code for one in compile_robot(text, "r.yaml", library()).findings} & {
         "TF309"
     } == codes

@@ -23,7 +23,7 @@ CIRCLE = "optics: {scan: {horizontal: 360 deg, near: 0.05, far: 10}}"
 def found(text: str, code: str) -> list[Finding]:
     done = compile_robot(HEAD + text, "r.yaml", library())
     assert not done.errors, done.errors
-    return [one for one in done.found if one.code == code]
+    return [one for one in done.findings if one.code == code]
 
 
 def scanner_at_a_wall(yaw_deg: float, scanner: str = CIRCLE) -> list[Finding]:

@@ -43,10 +43,10 @@ def marks(text: str) -> dict[str | None, set[tuple[int, str]]]:
     """Return the expected (line, code), by the profile that they need."""
     expected: dict[str | None, set[tuple[int, str]]] = {None: set()}
     for number, line in enumerate(text.splitlines(), 1):
-        found = MARK.search(line)
-        if found:
-            expected.setdefault(found["profile"], set()).update(
-                (number, code) for code in found["codes"].split()
+        match = MARK.search(line)
+        if match:
+            expected.setdefault(match["profile"], set()).update(
+                (number, code) for code in match["codes"].split()
             )
     return expected
 
@@ -74,20 +74,22 @@ def moments(name: str, scale: Vector) -> Moments:
     return measured(str(SPECS[0].parent / name), scale)
 
 
-def places(found: tuple[Finding, ...]) -> set[tuple[int, str]]:
-    return {(one.span.line, one.code) for one in found if one.span}
+def places(findings: tuple[Finding, ...]) -> set[tuple[int, str]]:
+    return {(one.span.line, one.code) for one in findings if one.span}
 
 
 @pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Path) -> None:
     expected = marks(spec.read_text("utf-8"))
     bare = compiled(spec)
-    assert places((*bare.found, *unused_allows(bare.allows, set(bare.used)))) == expected.pop(None)
+    assert places((*bare.findings, *unused_allows(bare.allows, set(bare.used)))) == expected.pop(
+        None
+    )
     for profile, more in expected.items():
         assert profile
-        alone = {(one.code, one.message) for one in compiled(spec).found}
+        alone = {(one.code, one.message) for one in compiled(spec).findings}
         added = [
-            one for one in compiled(spec, profile).found if (one.code, one.message) not in alone
+            one for one in compiled(spec, profile).findings if (one.code, one.message) not in alone
         ]
         assert places(tuple(added)) == more
 
@@ -120,7 +122,7 @@ CONFLICTS = {
 
 @pytest.mark.parametrize(("code", "spec"), CONFLICTS.items())
 def test_a_conflict_shows_its_other_place_too(code: str, spec: str) -> None:
-    of_code = [one for one in compiled(SPECS[0].parent / spec).found if one.code == code]
+    of_code = [one for one in compiled(SPECS[0].parent / spec).findings if one.code == code]
     shown = [
         one for one in of_code if any(note.span and note.span != one.span for note in one.notes)
     ]
@@ -132,7 +134,7 @@ def test_a_conflict_shows_its_other_place_too(code: str, spec: str) -> None:
 @pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> None:
     lines = spec.read_text("utf-8").splitlines()
-    for one in compiled(spec).found:
+    for one in compiled(spec).findings:
         assert one.message
         assert "\n" not in one.message + one.help
         span = one.span
@@ -144,8 +146,8 @@ def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> Non
 
 
 def test_findings_come_in_the_order_of_the_file() -> None:
-    found = compiled(SPECS[0].parent / "everything.yaml").found
-    at = [(one.span.line, one.span.column) for one in found if one.span]
+    findings = compiled(SPECS[0].parent / "everything.yaml").findings
+    at = [(one.span.line, one.span.column) for one in findings if one.span]
     assert at == sorted(at)
 
 
@@ -158,8 +160,8 @@ def test_findings_come_in_the_order_of_the_file() -> None:
     ],
 )
 def test_the_nearest_known_name_is_the_advice(spec: str, wrong: str, right: str) -> None:
-    found = compiled(SPECS[0].parent / f"{spec}.yaml").found
-    assert any(wrong in words(one) and right in words_of(one.help) for one in found)
+    findings = compiled(SPECS[0].parent / f"{spec}.yaml").findings
+    assert any(wrong in words(one) and right in words_of(one.help) for one in findings)
 
 
 def test_the_advice_for_a_chain_of_joints_that_follow_each_other_moves_the_last_as_before() -> (
@@ -174,8 +176,8 @@ def test_the_advice_for_a_chain_of_joints_that_follow_each_other_moves_the_last_
     lines = [f"  {name}: {joint.format(name, more)}" for name, more in joints.items()]
     links = "links: {base_link: {}, a: {}, b: {}, c: {}}\njoints:\n"
     text = f"tfcompose: 1\nrobot: r\n{links}" + "\n".join(lines)
-    found = compile_robot(text, "r.yaml", library()).found
-    (chain,) = [one for one in found if one.code == "TF708"]
+    findings = compile_robot(text, "r.yaml", library()).findings
+    (chain,) = [one for one in findings if one.code == "TF708"]
     assert "{joint: a, multiplier: -4, offset: -0.9}" in chain.help
 
 
@@ -187,6 +189,6 @@ def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on() -> None:
 
     robot = compiled(SPECS[0].parent / "no_frames.yaml").robot
     assert robot
-    found = check(robot, [two_parents, *RULES.values()])
-    assert {one.code for one in found} == {"TF903", "TF206"}
-    assert next(one for one in found if one.code == "TF903").span == Span("no_frames.yaml")
+    findings = check(robot, [two_parents, *RULES.values()])
+    assert {one.code for one in findings} == {"TF903", "TF206"}
+    assert next(one for one in findings if one.code == "TF903").span == Span("no_frames.yaml")

@@ -22,7 +22,7 @@ def test_with_all_rules_off_that_can_be_off_a_robot_is_built_or_refused(spec: Pa
     codes = sorted(
         {
             one.code
-            for one in compile_robot(text, spec.name, PRESETS).found
+            for one in compile_robot(text, spec.name, PRESETS).findings
             if can_be_allowed(one.code)
         }
     )
@@ -30,7 +30,7 @@ def test_with_all_rules_off_that_can_be_off_a_robot_is_built_or_refused(spec: Pa
         return
     rules = ", ".join(f"{code}: off" for code in codes)
     made = compile_robot(f"{text}\nrules: {{{rules}}}\n", spec.name, PRESETS)
-    assert not {one.code for one in made.found} & set(codes)
+    assert not {one.code for one in made.findings} & set(codes)
     if made.robot and not made.errors:
         (plan,) = [file.text for file in emit(made.robot) if file.path == "plan.json"]
         assert read_plan(plan, "plan.json").robot == made.robot.name
@@ -50,7 +50,7 @@ def test_what_leaves_nothing_to_build_always_counts(text: str, code: str) -> Non
         f"tfcompose: 1\nrobot: r\nrules: {{{code}: off}}\n{text}  # tfcompose: allow {code}"
         " because I say so\n"
     )
-    found = {one.code: one.severity for one in compile_robot(text, "r.yaml", PRESETS).found}
+    found = {one.code: one.severity for one in compile_robot(text, "r.yaml", PRESETS).findings}
     assert (found[code], found["TF017"]) == ("error", "error")
 
 
@@ -68,9 +68,12 @@ def test_a_limit_alone_switches_nothing_off(entry: str) -> None:
     text = (
         f"tfcompose: 1\nrobot: r\nlinks: {{base_link: {{}}, {wall}}}\nsensors: {{eye: {camera}}}\n"
     )
-    assert compile_robot(text, "r.yaml", PRESETS).found == ()
-    (found,) = compile_robot(f"{text}rules: {{{entry}}}\n", "r.yaml", PRESETS).found
-    assert (found.code, found.severity) == ("TF641", "error" if "error" in entry else "warning")
+    assert compile_robot(text, "r.yaml", PRESETS).findings == ()
+    (finding,) = compile_robot(f"{text}rules: {{{entry}}}\n", "r.yaml", PRESETS).findings
+    assert (finding.code, finding.severity) == (
+        "TF641",
+        "error" if "error" in entry else "warning",
+    )
 
 
 def test_a_rule_that_is_off_does_not_run(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -124,4 +124,4 @@ def test_urdf_keeps_the_plain_names() -> None:
 def test_what_cannot_be_isolated_is_a_finding(
     ros: str, changes: dict[str, str], expected: list[str]
 ) -> None:
-    assert [found.code for found in robot(ros, **changes).found] == expected
+    assert [finding.code for finding in robot(ros, **changes).findings] == expected

@@ -35,7 +35,7 @@ EXE = "run: {package: p, executable: e}"
 def files_of(processes: str, head: str = HEAD) -> dict[str, str]:
     compiled = compile_robot(f"{head}  {processes}\n", "r.yaml", library())
     assert compiled.robot
-    assert not compiled.errors, compiled.found
+    assert not compiled.errors, compiled.findings
     return {file.path: file.text for file in emit(compiled.robot)}
 
 
@@ -308,12 +308,12 @@ REFUSED = {
 @pytest.mark.parametrize("keys", REFUSED)
 def test_what_cannot_be_meant_is_one_finding_at_its_place(keys: str) -> None:
     text = f"{HEAD}  a: {{{keys}}}\n"
-    (found,) = compile_robot(text, "r.yaml", library()).found
-    at = found.span
-    assert at
+    (finding,) = compile_robot(text, "r.yaml", library()).findings
+    span = finding.span
+    assert span
     assert (
-        found.code,
-        text.splitlines()[at.line - 1][at.column - 1 : at.end_column - 1],
+        finding.code,
+        text.splitlines()[span.line - 1][span.column - 1 : span.end_column - 1],
     ) == REFUSED[keys]
 
 
@@ -323,7 +323,7 @@ def test_a_stand_in_takes_the_place_of_a_shells_command() -> None:
         f"{HEAD}  a: {{run: 'x | y', shell: true}}\nprofiles: {{sim: {{processes: {{a: {{external:"
         " true}}}}\n"
     )
-    assert [one.code for one in compile_robot(text, "r.yaml", library(), ["sim"]).found] == []
+    assert [one.code for one in compile_robot(text, "r.yaml", library(), ["sim"]).findings] == []
 
 
 def test_a_stand_in_is_kept_and_ended_as_what_it_stands_in_for() -> None:
@@ -335,7 +335,7 @@ def test_a_stand_in_is_kept_and_ended_as_what_it_stands_in_for() -> None:
     text = f"{HEAD}  a: {{run: [x], {how}, cwd: ., ready: {{log: up}}, params: {{b: 1}}}}\n"
     text += "profiles: {sim: {processes: {a: {simulate: {fixed: {}}}}}}\n"
     compiled = compile_robot(text, "r.yaml", library(), ["sim"])
-    assert compiled.found == ()
+    assert compiled.findings == ()
     assert compiled.robot
     stand_in = next(one for one in compiled.robot.processes if one.name == "a")
     assert (stand_in.restart, stand_in.max_restarts, stand_in.stop.timeout_s) == ("always", 2, 3.0)
@@ -365,8 +365,8 @@ def built_at(
     (tmp_path / "robots/maps/a.yaml").touch()
     file = tmp_path / "robots/r.yaml"
     compiled = compile_robot(text, str(file), library(), disk=disk())
-    if compiled.found:
-        return list(compiled.found)
+    if compiled.findings:
+        return list(compiled.findings)
     assert compiled.robot
     files = {
         file.path: file.text

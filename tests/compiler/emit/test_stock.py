@@ -45,7 +45,7 @@ def compiled(more: str = "") -> Compiled:
 
 def built(more: str = "") -> tuple[dict[str, Any], dict[str, str]]:
     found = compiled(more)
-    assert not found.found, found.found
+    assert not found.findings, found.findings
     assert found.robot
     files = {file.path: file.text for file in emit(found.robot)}
     return json.loads(files["plan.json"]), files

@@ -61,7 +61,7 @@ def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
             plain = compile_robot(spec(name, options, tf, {}), "r.yaml", KNOWN)
             requested = [
                 frame
-                for one in plain.found
+                for one in plain.findings
                 if one.code == "TF605"
                 for frame in REQUESTED.findall(one.help)
             ]

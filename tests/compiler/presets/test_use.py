@@ -69,9 +69,9 @@ def driver_parameters(robot: Robot) -> dict[str, Any]:
 
 
 def unknown(preset: str, **keys: Any) -> dict[str, Any]:
-    found = compiled(preset, **keys).found
+    findings = compiled(preset, **keys).findings
     requested: dict[str, Any] = {}
-    for one in found:
+    for one in findings:
         if one.code == "TF605":
             requested |= yaml.safe_load(one.help.partition(" write: ")[2])["sensors"]["s"][
                 "frames"
@@ -106,8 +106,8 @@ def test_the_switch_is_among_the_parameters_of_the_driver(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in DRIVEN if name not in WITH_SWITCH])
 def test_without_a_switch_tfcompose_cannot_publish_what_the_driver_does(name: str) -> None:
     frames = unknown(name, tf="tfcompose", driver="none")
-    (found,) = compiled(name, tf="tfcompose", frames=frames).errors
-    expect(found, "TF604", name)
+    (finding,) = compiled(name, tf="tfcompose", frames=frames).errors
+    expect(finding, "TF604", name)
     assert not compiled(name, tf="tfcompose", driver="none", frames=frames).errors
     assert not compiled(name, tf="driver", frames=unknown(name)).errors
 
@@ -172,7 +172,7 @@ def test_two_of_one_kind_share_no_frame_no_node_and_no_serial_number() -> None:
     }
     done = compile_robot(f"{HEAD}sensors: {json.dumps(sensors)}\n", "r.yaml", KNOWN)
     assert done.robot
-    assert not done.found
+    assert not done.findings
     nodes = {process.name: process.node for process in done.robot.processes}
     assert (nodes["left"], nodes["right"]) == ("/left/left", "/right/right")
     files = {
@@ -266,21 +266,21 @@ def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:
     robot = robot_of("oak/oak-d", tf="driver", frames=frames)
     assert edge_of(robot, "s_left_camera_frame").parent == "s_right_camera_frame"
     frames = {"s_left_camera_frame": {"parent": "s_righ_camera_frame"}}
-    found = compiled("oak/oak-d", tf="driver", frames=frames).errors
-    assert [(one.code, one.help) for one in found] == [
+    findings = compiled("oak/oak-d", tf="driver", frames=frames).errors
+    assert [(one.code, one.help) for one in findings] == [
         ("TF203", "did you mean s_right_camera_frame?")
     ]
 
 
 def test_what_nobody_knows_is_requested_with_the_yaml_to_write_and_is_never_a_zero() -> None:
-    found = compiled("realsense/d457", tf="tfcompose").found
+    findings = compiled("realsense/d457", tf="tfcompose").findings
     yaml_to_write = (
         "sensors: {s: {frames: {s_color_frame: {xyz: [x, y, z], rpy: [roll, pitch, yaw]}}}}"
     )
-    expect(found[0], "TF605", "realsense/d457", "s_color_frame", "s_link", yaml_to_write)
+    expect(findings[0], "TF605", "realsense/d457", "s_color_frame", "s_link", yaml_to_write)
     (several,) = compiled(
         "realsense/d457", tf="tfcompose", options={"streams": ["infra2", "color"]}
-    ).found
+    ).findings
     expect(several, "TF605", "s_color_frame and s_infra2_frame")
     robot = robot_of(
         "realsense/d457", frames={"s_color_frame": {"xyz": [0, -0.059, 0], "rpy": [0, 0, 0]}}
@@ -288,14 +288,14 @@ def test_what_nobody_knows_is_requested_with_the_yaml_to_write_and_is_never_a_ze
     assert edge_of(robot, "s_color_frame").pose.xyz == (0, -0.059, 0)
     assert not edge_of(robot, "s_color_frame").nominal
     assert [
-        one.code for one in compiled("realsense/d457", options={"streams": ["depth"]}).found
+        one.code for one in compiled("realsense/d457", options={"streams": ["depth"]}).findings
     ] == []
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_preset_has_no_findings_with_its_default_options(name: str) -> None:
-    found = compiled(name, xyz=[0.1, 0, 0.2]).found
-    assert found == ()
+    findings = compiled(name, xyz=[0.1, 0, 0.2]).findings
+    assert findings == ()
 
 
 def test_where_only_the_driver_knows_a_frame_is_its_edge_is_declared_without_a_pose() -> None:
@@ -357,8 +357,8 @@ def test_a_name_that_the_driver_makes_itself_cannot_be_changed() -> None:
     done = compiled(
         "realsense/d435", frames={"s_color_optical_frame": {"name": "eye_optical_frame"}}
     )
-    (found,) = done.errors
-    expect(found, "TF604", "s_color_optical_frame", "eye_optical_frame")
+    (finding,) = done.errors
+    expect(finding, "TF604", "s_color_optical_frame", "eye_optical_frame")
     assert not compiled("ouster/os1", frames={"s_lidar": {"name": "roof_lidar"}}).errors
     assert (
         driver_parameters(robot_of("ouster/os1", frames={"s_lidar": {"name": "roof_lidar"}}))[
@@ -380,9 +380,9 @@ def test_misspelt_names_of_presets_and_options_get_the_nearest() -> None:
         ("ouster/os1", '{"revision": 8}'): "one of: c, d, 7",
     }
     for (preset, options), advice in wrong.items():
-        found = compiled(preset, options=json.loads(options)).found
-        assert found
-        assert advice in found[0].help, found[0]
+        findings = compiled(preset, options=json.loads(options)).findings
+        assert findings
+        assert advice in findings[0].help, findings[0]
 
 
 def write(folder: Path, name: str, text: str) -> None:
@@ -402,9 +402,9 @@ def test_a_folder_next_to_the_robot_adds_presets(tmp_path: Path) -> None:
     for name, height in (("me/mast", 0.3), ("me/long-mast", 1.0)):
         done = compiled(name, top, file)
         assert done.robot
-        assert done.found == ()
+        assert done.findings == ()
         assert edge_of(done.robot, "s_optical_frame").pose.xyz == (0, 0, height)
-    assert compiled("me/mist", top, file).found[0].help == "did you mean me/mast?"
+    assert compiled("me/mist", top, file).findings[0].help == "did you mean me/mast?"
 
 
 def test_a_preset_that_stands_before_a_built_in_one_is_reported_and_may_change_it(
@@ -418,13 +418,17 @@ def test_a_preset_that_stands_before_a_built_in_one_is_reported_and_may_change_i
     done = compiled("realsense/d435i", "preset_path: mine/\n", str(tmp_path / "r.yaml"))
     assert done.robot
     assert edge_of(done.robot, "s_color_frame").pose.xyz == (0, 0.0149, 0)
-    assert [(one.code, one.severity) for one in done.found] == [("TF607", "warning")]
-    assert compiled("realsense/d435", "preset_path: mine\n", str(tmp_path / "r.yaml")).found == ()
+    assert [(one.code, one.severity) for one in done.findings] == [("TF607", "warning")]
+    assert (
+        compiled("realsense/d435", "preset_path: mine\n", str(tmp_path / "r.yaml")).findings == ()
+    )
 
 
 def test_a_folder_that_is_not_there_is_reported(tmp_path: Path) -> None:
-    found = compiled("generic/imu", "preset_path: [mine, .]\n", str(tmp_path / "r.yaml")).found
-    assert [(one.code, one.message) for one in found] == [
+    findings = compiled(
+        "generic/imu", "preset_path: [mine, .]\n", str(tmp_path / "r.yaml")
+    ).findings
+    assert [(one.code, one.message) for one in findings] == [
         ("TF001", f"preset_path: no folder {tmp_path}/mine")
     ]
 
@@ -435,9 +439,9 @@ def test_what_is_wrong_in_a_preset_is_found_in_its_file(
 ) -> None:
     assert old in MAST
     write(tmp_path, "me/mast", MAST.replace(old, new, 1))
-    found = compiled("me/mast", "preset_path: [.]\n", str(tmp_path / "r.yaml")).found
-    assert found
-    assert all(one.span and one.span.file.endswith("mast.yaml") for one in found)
+    findings = compiled("me/mast", "preset_path: [.]\n", str(tmp_path / "r.yaml")).findings
+    assert findings
+    assert all(one.span and one.span.file.endswith("mast.yaml") for one in findings)
 
 
 def test_a_python_package_adds_presets_by_an_entry_point(
@@ -455,10 +459,10 @@ def test_a_python_package_adds_presets_by_an_entry_point(
     with monkeypatch.context() as patch:
         patch.setattr(sys, "path", [str(tmp_path), *sys.path])
         compiling._preset_packages.cache_clear()
-        assert compiled("me/mast").found == ()
+        assert compiled("me/mast").findings == ()
         assert "me/mast" in library().names
     compiling._preset_packages.cache_clear()
-    assert compiled("me/mast").found[0].code == "TF601"
+    assert compiled("me/mast").findings[0].code == "TF601"
 
 
 @pytest.mark.parametrize(
@@ -477,10 +481,10 @@ def test_a_ros_package_adds_presets_by_the_ament_index(
     with monkeypatch.context() as patch:
         patch.setenv("AMENT_PREFIX_PATH", f"{overlay}:{underlay}:")
         compiling._preset_packages.cache_clear()
-        assert compiled("me/mast").found == ()
+        assert compiled("me/mast").findings == ()
         assert "me/old" not in library().names
     compiling._preset_packages.cache_clear()
-    assert compiled("me/mast").found[0].code == "TF601"
+    assert compiled("me/mast").findings[0].code == "TF601"
 
 
 def test_only_the_presets_that_a_robot_uses_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -497,7 +501,7 @@ def test_only_the_presets_that_a_robot_uses_are_read(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(
         compiling.PresetFolders, "packages", lambda *_: pytest.fail("packages were looked for")
     )
-    assert compiled("realsense/d455").found == ()
+    assert compiled("realsense/d455").findings == ()
     assert sorted(read) == ["_base", "_d400", "_imu", "d455"]
 
 

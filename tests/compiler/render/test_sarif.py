@@ -29,16 +29,16 @@ SPECS = sorted((Path(__file__).parents[1] / "check" / "specs").glob("*.yaml"))
 VALIDATOR = Draft4Validator(SCHEMA)
 
 
-def source_text(found: list[Finding]) -> Any:
+def source_text(findings: list[Finding]) -> Any:
     """Return the one run that is written of the findings; what the schema refuses is an error."""
-    log = json.loads(render_sarif(found, __version__))
+    log = json.loads(render_sarif(findings, __version__))
     VALIDATOR.validate(log)
     (run,) = log["runs"]
     return run
 
 
 def findings(spec: Path) -> list[Finding]:
-    return list(compile_robot(spec.read_text("utf-8"), spec.name, library()).found)
+    return list(compile_robot(spec.read_text("utf-8"), spec.name, library()).findings)
 
 
 def test_the_schema_is_the_official_one_of_2_1_0() -> None:

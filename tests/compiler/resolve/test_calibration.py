@@ -46,7 +46,7 @@ def compiled(robot: str, **files: str) -> Compiled:
 
 
 def edge_of(result: Compiled, child: str) -> Edge:
-    assert not result.found, [one.message for one in result.found]
+    assert not result.findings, [one.message for one in result.findings]
     edge = result.robot and result.robot.parent_edge(child)
     assert edge
     return edge
@@ -194,7 +194,7 @@ def test_each_format_gives_the_measured_pose(case: str, *, explicit: bool) -> No
     assert_same(edge.pose, MEASURED)
     made = edge.calibration
     assert made
-    assert (made.format, made.parent, made.child, made.at.file) == (
+    assert (made.format, made.parent, made.child, made.span.file) == (
         form,
         "base_link",
         "lens",
@@ -220,7 +220,7 @@ def test_degrees_and_radians_are_xacros_tags_and_other_tags_are_refused() -> Non
         ".nan",
     ):
         text = f"base_link: {{lens: {values.replace('!degrees 90', wrong)}}}\n"
-        assert {one.code for one in compiled(robot, c_yaml=text).found} == {"TF610"}, wrong
+        assert {one.code for one in compiled(robot, c_yaml=text).findings} == {"TF610"}, wrong
 
 
 KALIBR = (
@@ -299,7 +299,7 @@ def test_a_calibration_in_another_frame_than_the_parent_is_solved_through_fixed_
     )
     kit = Pose((1.0, 0.0, 0.0), (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
     assert_same(kit @ edge.pose, MEASURED)
-    assert "TF612" in {one.code for one in compiled(robot % "c.yaml", c_yaml=autoware()).found}
+    assert "TF612" in {one.code for one in compiled(robot % "c.yaml", c_yaml=autoware()).findings}
 
 
 def test_a_matrix_is_taken_the_way_that_parent_and_child_say() -> None:
@@ -337,7 +337,7 @@ def test_a_complete_file_is_applied_and_its_chain_too() -> None:
     assert_same(edge_of(result, "kit").pose, MEASURED)
     mount = edge_of(result, "camera_bottom_screw_frame").calibration
     assert mount
-    assert (mount.parent, mount.child, mount.at.line) == ("kit", "camera_link", 10)
+    assert (mount.parent, mount.child, mount.span.line) == ("kit", "camera_link", 10)
     assert_same(mount.pose, Pose((0.1, -0.34, 0.56), MEASURED.quat_xyzw))
 
 
@@ -366,18 +366,18 @@ PROBLEMS = {
 def test_what_cannot_be_used_is_reported_where_the_file_is_named_with_a_note_into_it(
     code: str, text: str
 ) -> None:
-    found = compiled(
+    findings = compiled(
         "frames: {lens: {parent: base_link, calibration: c.yaml}}\n", c_yaml=text
-    ).found
-    assert {one.code for one in found} == {code}
-    assert {one.span.file for one in found if one.span} == {"r.yaml"}
-    assert {note.span.file for one in found for note in one.notes if note.span} == {"c.yaml"}
+    ).findings
+    assert {one.code for one in findings} == {code}
+    assert {one.span.file for one in findings if one.span} == {"r.yaml"}
+    assert {note.span.file for one in findings for note in one.notes if note.span} == {"c.yaml"}
 
 
 def test_a_missing_file_and_a_missing_reader_are_findings() -> None:
     robot = "frames: {lens: {parent: base_link, calibration: c.yaml}}\n"
-    assert [one.code for one in compiled(robot).found] == ["TF610"]
-    assert [one.code for one in compile_robot(HEAD + robot, "r.yaml", library()).found] == [
+    assert [one.code for one in compiled(robot).findings] == ["TF610"]
+    assert [one.code for one in compile_robot(HEAD + robot, "r.yaml", library()).findings] == [
         "TF610"
     ]
 
@@ -391,7 +391,7 @@ def test_paths_are_relative_to_the_file_that_writes_them() -> None:
         return {"robots/common/base.yaml": base, "robots/common/cal/c.yaml": autoware()}[name]
 
     text = HEAD + "include: common/base.yaml\n"
-    assert not compile_robot(text, "robots/r.yaml", library(), read=read).found
+    assert not compile_robot(text, "robots/r.yaml", library(), read=read).findings
     assert requested == ["robots/common/base.yaml", "robots/common/cal/c.yaml"]
 
 
@@ -411,7 +411,7 @@ NOMINAL = (
 )
 def test_a_change_from_nominal_beyond_the_limit_is_a_finding(limit: str, codes: set[str]) -> None:
     assert {
-        one.code for one in compiled(NOMINAL % (QUAT, limit), c_yaml=autoware()).found
+        one.code for one in compiled(NOMINAL % (QUAT, limit), c_yaml=autoware()).findings
     } == codes
 
 
@@ -440,17 +440,17 @@ def test_the_nominal_pose_is_taken_to_the_frame_in_which_it_was_measured() -> No
     assert calibration
     assert calibration.nominal
     assert_same(calibration.nominal, MEASURED)
-    assert not {one.code for one in done.found} & {"TF615", "TF616"}
+    assert not {one.code for one in done.findings} & {"TF615", "TF616"}
 
 
 def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -> None:
     back = MEASURED.inverse()
     nominal = f"xyz: {list(back.xyz)}, quat_xyzw: {list(back.quat_xyzw)}, "
     robot = "frames: {lens: {parent: base_link, %scalibration: c.yaml}}\n"
-    found = compiled(robot % nominal, c_yaml=autoware()).found
-    assert [(one.code, one.severity) for one in found] == [("TF615", "warning")]
-    assert "c.yaml:2 (autoware)" in found[0].message
-    assert "0 mm and 0 deg" in found[0].message, "the distance of the inverse"
+    findings = compiled(robot % nominal, c_yaml=autoware()).findings
+    assert [(one.code, one.severity) for one in findings] == [("TF615", "warning")]
+    assert "c.yaml:2 (autoware)" in findings[0].message
+    assert "0 mm and 0 deg" in findings[0].message, "the distance of the inverse"
     # A body 1 m to the left; the sensor is said to be 1 m ahead, looking left, so the way back
     # leads to that body.
     mast = "joints: {j: {type: fixed, parent: base_link, child: mast, xyz: [0, 1, 0]}}\n"
@@ -461,9 +461,9 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     text = "base_link: {lens: {x: 1.0, y: 0, z: 0, roll: 0, pitch: 0, yaw: !degrees 90}}\n"
     outside = compile_robot(
         head + mast + robot % "", "r.yaml", library(), read=lambda _: text
-    ).found
+    ).findings
     assert [(one.code, one.severity) for one in outside] == [("TF615", "warning")]
-    assert not compiled(robot % "", c_yaml=autoware()).found
+    assert not compiled(robot % "", c_yaml=autoware()).findings
 
 
 @pytest.mark.parametrize(("length_m", "found"), [(3.0, set()), (1.0, {"TF615"})])
@@ -487,7 +487,7 @@ def test_a_calibration_is_outside_of_what_a_capsule_or_a_mesh_fills(
     done = compile_robot(
         robot, str(tmp_path / "r.yaml"), library(), read=lambda _: text, disk=disk()
     )
-    assert {one.code for one in done.found} == found
+    assert {one.code for one in done.findings} == found
 
 
 def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> None:
@@ -497,12 +497,14 @@ def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> Non
         " calibration: c.yaml}}\n"
     )
     text = "base_link: {lens: {x: 0.0125, y: 0, z: 0.05, roll: 0, pitch: 0, yaw: !degrees 90}}\n"
-    found = compiled(frames, c_yaml=text).found
-    assert [one.code for one in found] == ["TF616"]
-    assert "12.5 mm and 180 deg" in found[0].message
+    findings = compiled(frames, c_yaml=text).findings
+    assert [one.code for one in findings] == ["TF616"]
+    assert "12.5 mm and 180 deg" in findings[0].message
     head = HEAD.replace("TF640: off", "TF640: off, TF615: off")
-    found = compile_robot(head + frames, "r.yaml", library(), read=reader({"c.yaml": text})).found
-    assert [one.code for one in found] == ["TF616"]
+    findings = compile_robot(
+        head + frames, "r.yaml", library(), read=reader({"c.yaml": text})
+    ).findings
+    assert [one.code for one in findings] == ["TF616"]
 
 
 def test_a_quaternion_that_fits_with_its_w_first_is_given_in_the_right_order() -> None:
@@ -514,9 +516,9 @@ def test_a_quaternion_that_fits_with_its_w_first_is_given_in_the_right_order() -
         "header: {frame_id: base_link}\nchild_frame_id: lens\ntransform:\n"
         "  translation: {x: 0, y: 0, z: 0.05}\n  rotation: {x: 0.7071, y: 0, z: 0, w: 0.7071}\n"
     )
-    (found,) = compiled(frames, c_yaml=text).found
-    assert found.code == "TF616"
-    assert "x: 0, y: 0, z: 0.707107, w: 0.707107" in found.help
+    (finding,) = compiled(frames, c_yaml=text).findings
+    assert finding.code == "TF616"
+    assert "x: 0, y: 0, z: 0.707107, w: 0.707107" in finding.help
 
 
 @pytest.mark.parametrize(
@@ -556,8 +558,8 @@ def test_a_nominal_pose_with_w_first_or_of_the_body_is_named(
         " c.yaml}}\n"
     )
     text = f"base_link: {{{frame}: {{x: 0, y: 0, z: 0.05, {measured}}}}}\n"
-    found = [one for one in compiled(frames, c_yaml=text).found if one.code == "TF616"]
-    assert [advice in one.help for one in found] == [True]
+    findings = [one for one in compiled(frames, c_yaml=text).findings if one.code == "TF616"]
+    assert [advice in one.help for one in findings] == [True]
 
 
 def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> None:
@@ -566,23 +568,23 @@ def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> Non
         " calibration: c.yaml}}\n"
     )
     text = "kit: {lens: {x: 0.0, y: 4.9, z: 0, roll: 0, pitch: 0, yaw: 0}}\n"
-    assert not compiled(robot, c_yaml=text.replace("4.9", "5.1")).found, (
+    assert not compiled(robot, c_yaml=text.replace("4.9", "5.1")).findings, (
         "kit's y points to the rear"
     )
-    assert [one.code for one in compiled(robot, c_yaml=text.replace("4.9", "-4.9")).found] == [
+    assert [one.code for one in compiled(robot, c_yaml=text.replace("4.9", "-4.9")).findings] == [
         "TF615"
     ]
 
 
 def test_comments_in_launch_files_are_no_entries_and_each_publisher_is_one() -> None:
-    read = partial(read_calibration, file="c.launch", form="auto", at=Span("r.yaml"))
+    read = partial(read_calibration, file="c.launch", form="auto", span=Span("r.yaml"))
     assert [one.name for one in read(moveit_launch()).entries] == ["base_link → lens"]
     two = moveit_launch().replace(
         "</launch>", moveit_launch().partition("-->")[2].replace("lens", "other")
     )
     assert [one.child for one in read(two).entries] == ["lens", "other"]
     angles = '<launch><node type="static_transform_publisher" args="1 2 3 0 0 0.5 a b"/></launch>'
-    assert [one.code for one in read(angles).found] == ["TF610"]
+    assert [one.code for one in read(angles).findings] == ["TF610"]
 
 
 def test_a_profile_takes_another_file_and_a_missing_one_has_no_place() -> None:
@@ -591,7 +593,7 @@ def test_a_profile_takes_another_file_and_a_missing_one_has_no_place() -> None:
     texts = {"c.yaml": autoware(), "d.yaml": autoware().replace("0.12", "0.2")}
     night = compile_robot(HEAD + robot, "r.yaml", library(), ["night"], read=texts.__getitem__)
     assert edge_of(night, "lens").pose.xyz[0] == 0.2
-    missing = compiled(robot).found
+    missing = compiled(robot).findings
     assert [(one.code, one.notes) for one in missing] == [("TF610", ())]
 
 
@@ -600,8 +602,8 @@ def test_a_lens_that_the_driver_places_is_a_finding_at_the_calibration() -> None
         "sensors:\n  camera:\n    preset: realsense/d435i\n    parent: base_link\n    calibration:"
         " c.yaml\n"
     )
-    found = compiled(robot, c_yaml=autoware(child=OPTICAL)).found
-    assert [(one.code, one.span.line) for one in found if one.span] == [("TF405", 9)]
+    findings = compiled(robot, c_yaml=autoware(child=OPTICAL)).findings
+    assert [(one.code, one.span.line) for one in findings if one.span] == [("TF405", 9)]
 
 
 TEXTS = [*STRAIGHT.values(), KALIBR.format(ROWS)]
@@ -617,8 +619,8 @@ def settle(text: str, form: str) -> None:
     for output in ("", f", format: {form}", ", parent: cam0, child: imu"):
         result = compiled(ROBOT % output, c_yaml=text)
         assert result.robot
-        assert "TF903" not in {one.code for one in result.found}
-        assert all("\n" not in one.message and len(one.message) < 2000 for one in result.found)
+        assert "TF903" not in {one.code for one in result.findings}
+        assert all("\n" not in one.message and len(one.message) < 2000 for one in result.findings)
 
 
 @st.composite
@@ -660,8 +662,11 @@ def test_of_two_files_that_measure_an_edge_the_first_is_taken_and_the_other_repo
     result = compiled(
         "calibrations: [a.yaml, b.yaml]\nframes: {lens: {parent: base_link}}\n", **files
     )
-    (found,) = result.errors
-    assert (found.code, found.notes[0].span and found.notes[0].span.file) == ("TF613", "a.yaml")
+    (finding,) = result.errors
+    assert (finding.code, finding.notes[0].span and finding.notes[0].span.file) == (
+        "TF613",
+        "a.yaml",
+    )
     edge = result.robot and result.robot.parent_edge("lens")
     assert edge
     assert edge.pose.xyz == pytest.approx(XYZ)

@@ -34,7 +34,7 @@ def compiled(more: str = "", *, ros: str = "isolate: none", **changes: str) -> C
 
 
 def files_of(done: Compiled) -> dict[str, str]:
-    assert not done.found, done.found
+    assert not done.findings, done.findings
     assert done.robot
     return {file.path: file.text for file in emit(done.robot)}
 
@@ -45,7 +45,7 @@ def params_of(done: Compiled, process: str) -> dict[str, dict[str, Any]]:
 
 
 def output(done: Compiled) -> list[str]:
-    return [f"{one.code} {one.message}" for one in done.found]
+    return [f"{one.code} {one.message}" for one in done.findings]
 
 
 PREFIXED = "isolate: frames, shared_frames: [map]"
@@ -74,9 +74,9 @@ def test_a_filter_that_owns_the_upper_edge_is_configured_to() -> None:
 
 def test_a_filter_that_sends_another_edge_than_its_own_is_found() -> None:
     output = {"preset: ekf}": "preset: ekf}, params: {base_link_frame_output: base_footprint}"}
-    (found,) = compiled(**output).found
-    assert found.code == "TF333"
-    assert {"base_link_frame_output", "'base_footprint'", "'base_link'"} <= words(found)
+    (finding,) = compiled(**output).findings
+    assert finding.code == "TF333"
+    assert {"base_link_frame_output", "'base_footprint'", "'base_link'"} <= words(finding)
 
 
 def test_unusual_names_are_set_too() -> None:
@@ -199,11 +199,11 @@ FINDINGS = {
 
 @pytest.mark.parametrize("more", FINDINGS)
 def test_a_claim_that_cannot_be_settled_is_one_finding_with_the_exact_switch(more: str) -> None:
-    (found,) = compiled(more).found
+    (finding,) = compiled(more).findings
     code, names, switch = FINDINGS[more]
-    assert found.code == code
-    assert set(names.split()) <= words(found)
-    assert switch in found.help
+    assert finding.code == code
+    assert set(names.split()) <= words(finding)
+    assert switch in finding.help
 
 
 @pytest.mark.parametrize(
@@ -228,15 +228,15 @@ def test_what_is_switched_off_or_allowed_is_no_finding(more: str) -> None:
 
 def test_an_owner_that_is_configured_not_to_publish_is_a_finding_at_the_parameter() -> None:
     done = compiled(**{"node: {preset: ekf}": "node: {preset: ekf}, params: {publish_tf: false}"})
-    (found,) = done.found
-    assert found.code == "TF333"
-    assert {"ekf", "odom", "base_link", "publish_tf"} <= words(found)
+    (finding,) = done.findings
+    assert finding.code == "TF333"
+    assert {"ekf", "odom", "base_link", "publish_tf"} <= words(finding)
 
 
 def test_an_edge_that_no_node_of_its_owner_is_known_to_publish_is_a_finding() -> None:
     done = compiled(**{"owner: ekf": "owner: slam"})
-    (found,) = [one for one in done.found if one.code == "TF332"]
-    assert {"slam", "odom", "base_link"} <= words(found)
+    (finding,) = [one for one in done.findings if one.code == "TF332"]
+    assert {"slam", "odom", "base_link"} <= words(finding)
 
 
 def test_the_plan_knows_what_stops_a_node() -> None:
@@ -291,11 +291,11 @@ def test_a_switch_that_the_user_sets_otherwise_is_not_overwritten_in_silence() -
         " ekf}}\nprocesses:\n  ekf: {external: true}\n  drive:\n    run: RUN\n    params: {tf:"
         " true}\n    publishes: [{parent: odom, child: base_link, off: {tf: false}}]\n"
     )
-    (found,) = compile_robot(
+    (finding,) = compile_robot(
         text.replace("RUN", "{package: p, executable: e}"), "r.yaml", library()
-    ).found
-    assert found.code == "TF333"
-    assert {"tf", "drive", "ekf", "odom", "base_link"} <= words(found)
+    ).findings
+    assert finding.code == "TF333"
+    assert {"tf", "drive", "ekf", "odom", "base_link"} <= words(finding)
 
 
 def test_a_switch_is_a_parameter_for_a_command_that_takes_the_file() -> None:
@@ -305,7 +305,7 @@ def test_a_switch_is_a_parameter_for_a_command_that_takes_the_file() -> None:
         " publishes: [{parent: odom, child: base_link, off: {tf: false}}]}\n"
     )
     compiled = compile_robot(text, "r.yaml", library())
-    assert not compiled.found
+    assert not compiled.findings
     assert compiled.robot
     assert {file.path: file.text for file in emit(compiled.robot)}["params/drive.yaml"].endswith(
         '"tf": false\n'

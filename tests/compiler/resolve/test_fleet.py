@@ -36,7 +36,7 @@ def compiled(text: str = ROBOT, fleet: str = FLEET) -> Compiled:
 def share_of(text: str = ROBOT) -> Process:
     done = compiled(text)
     assert done.robot
-    assert not done.found, done.found
+    assert not done.findings, done.findings
     (one,) = (process for process in done.robot.processes if process.name == "fleet_share")
     return one
 
@@ -97,8 +97,8 @@ def test_a_process_of_its_name_takes_its_place() -> None:
 def test_what_is_wrong_with_the_fleets_file_is_found(
     text: str, fleet: str, file: str | None, code: str
 ) -> None:
-    found = compiled(text, fleet).found
-    assert [(one.code, one.span and one.span.file) for one in found] == [(code, file)]
+    findings = compiled(text, fleet).findings
+    assert [(one.code, one.span and one.span.file) for one in findings] == [(code, file)]
 
 
 @pytest.mark.parametrize(
@@ -106,5 +106,5 @@ def test_what_is_wrong_with_the_fleets_file_is_found(
 )
 def test_edges_are_not_missed_in_a_robot_that_is_refused(edit: tuple[str, str]) -> None:
     found = compiled(ROBOT.replace(*edit))
-    assert "TF887" not in {one.code for one in found.found}
+    assert "TF887" not in {one.code for one in found.findings}
     assert found.errors

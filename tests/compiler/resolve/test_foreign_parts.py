@@ -118,7 +118,7 @@ def cell(tmp_path: Path) -> Any:
 
 
 def sound(compiled: Compiled) -> Any:
-    assert not compiled.found, [(str(one.span), one.message) for one in compiled.found]
+    assert not compiled.findings, [(str(one.span), one.message) for one in compiled.findings]
     return compiled.robot
 
 
@@ -177,7 +177,7 @@ def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_p
         full = text.format(name, kind) + f'<child link="{name}_b"/></joint></robot>'
         (tmp_path / f"{name}.urdf").write_text(full, encoding="utf-8")
     one, two = "one: {urdf: one.urdf, parent: table}", "two: {urdf: two.urdf, parent: table}"
-    (found,) = cell(one, two).found
+    (found,) = cell(one, two).findings
     assert found.code == "TF505"
     assert {"two", "j"} <= words(found)
     assert [note.span.file.rpartition("/")[2] for note in found.notes if note.span] == [
@@ -317,10 +317,10 @@ def test_a_part_of_which_nothing_is_left_because_its_own_part_was_refused_says_n
     for more in ("", ", root: tool"):
         part = f"m: {{spec: inner.yaml, prefix: m_, parent: base_link{more}}}"
         text = f"tfcompose: 1\nrobot: r\nlinks: {{base_link: {{}}}}\nparts: {{{part}}}\n"
-        found = compile_robot(
+        findings = compile_robot(
             text, str(tmp_path / "r.yaml"), library(), read=read_text, disk=disk()
-        ).found
-        assert [one.code for one in found] == ["TF001"], more
+        ).findings
+        assert [one.code for one in findings] == ["TF001"], more
 
 
 def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(
@@ -338,7 +338,7 @@ def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(
         f' name="w"/>{call}</robot>'
     )
     (tmp_path / "third/arm/outer.xacro").write_text(outer, "utf-8")
-    (found,) = cell("o: {xacro: third/arm/outer.xacro, parent: table}").found
+    (found,) = cell("o: {xacro: third/arm/outer.xacro, parent: table}").findings
     assert "'hight'" in found.message
     assert [note.span and note.span.file.endswith("mast.xacro") for note in found.notes] == [
         True,
@@ -356,7 +356,7 @@ def test_a_floating_joint_of_a_foreign_file_is_reported_where_it_can_have_an_own
     (tmp_path / "third/arm/arm.urdf").write_text(
         ARM.replace('name="end" type="fixed"', 'name="end" type="floating"')
     )
-    (found,) = cell(LEFT).found
+    (found,) = cell(LEFT).findings
     assert (found.code, "tfcompose import" in found.help) == ("TF715", True)
 
 
@@ -471,9 +471,9 @@ def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(
         f' reference="{name}"/>\'}}\nros2_control: {{hw: {{plugin: a/B, joints: {{{name}:'
         f" {{state: {{position: {{}}}}}}}}}}}}\nbase: {name}",
     )
-    assert [one.code for one in result.found] == ["TF724", "TF203"]
-    assert "ur" in result.found[0].message.split()
-    assert result.found[1].message.split()[-1] == "tabel"
+    assert [one.code for one in result.findings] == ["TF724", "TF203"]
+    assert "ur" in result.findings[0].message.split()
+    assert result.findings[1].message.split()[-1] == "tabel"
 
 
 def test_what_is_wrong_with_hardware_of_a_part_is_reported_at_its_line_with_every_use(
@@ -489,7 +489,7 @@ def test_what_is_wrong_with_hardware_of_a_part_is_reported_at_its_line_with_ever
     mine = "{shoulder: {command: {position: {}}}}".replace("shoulder", "left_shoulder")
     (found,) = cell(
         LEFT, f"{RIGHT}\nros2_control: {{mine: {{plugin: a/B, joints: {mine}}}}}"
-    ).found
+    ).findings
     assert found.code == "TF717"
     assert found.span
     assert (
@@ -501,7 +501,7 @@ def test_what_is_wrong_with_hardware_of_a_part_is_reported_at_its_line_with_ever
     (full,) = cell(
         f"{LEFT.replace('root: base, ', '')}\nros2_control: {{mine: {{plugin: a/B, joints:"
         f" {mine}}}}}"
-    ).found
+    ).findings
     assert (full.code, full.span) == ("TF717", found.span)
 
 
@@ -519,7 +519,7 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(
 ) -> None:
     file = tmp_path / "third/arm/arm.urdf"
     file.write_text(ARM.replace('ixx="0.02" iyy="0.02"', 'ixx="9" iyy="9"'), encoding="utf-8")
-    assert cell(LEFT).found == ()
+    assert cell(LEFT).findings == ()
     file.write_text(ARM.replace('parent link="finger"', 'parent link="fingr"'), encoding="utf-8")
     (found,) = cell(LEFT.replace("root: base, ", "")).errors
     assert (found.code, found.span.file) == ("TF203", str(file))

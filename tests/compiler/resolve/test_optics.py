@@ -53,7 +53,7 @@ def test_a_user_says_what_a_generic_sensor_sees_and_the_place_of_it_is_its_sourc
     assert image.sources == (
         OpticsSource(("horizontal", "resolution"), "r.yaml:5:59", "robot file"),
     )
-    assert (image.at.line, image.at.column) == (5, 59)
+    assert (image.span.line, image.span.column) == (5, 59)
 
 
 def test_a_scanner_in_one_plane_has_a_sector_and_no_height() -> None:
@@ -106,6 +106,6 @@ def test_a_frame_of_the_optics_goes_by_the_name_that_the_user_gives_it() -> None
     ],
 )
 def test_optics_that_cannot_be_true_are_refused(sensor: str, code: str, word: str) -> None:
-    found = compiled(sensor).errors
-    assert [one.code for one in found] == [code], found
-    assert word in found[0].message + found[0].help
+    findings = compiled(sensor).errors
+    assert [one.code for one in findings] == [code], findings
+    assert word in findings[0].message + findings[0].help

@@ -80,7 +80,7 @@ def test_sections_of_several_files_have_the_order_in_which_their_names_come_firs
 def test_a_container_needs_no_parameters_of_its_own() -> None:
     robot = HEAD.partition("processes")[0] + ("containers: {box: {params: {file: p.yaml}}}\n")
     done = compile_robot(robot, "r.yaml", library(), read=reader({"p.yaml": FILE}))
-    assert "TF334" not in {one.code for one in done.found}
+    assert "TF334" not in {one.code for one in done.findings}
 
 
 def test_a_file_may_be_named_as_everywhere_else() -> None:
@@ -117,10 +117,10 @@ def test_a_parameter_that_contradicts_the_clock_is_found_where_it_is_given(
     params: str, places: list[str]
 ) -> None:
     sim = "/**: {ros__parameters: {use_sim_time: true}}"
-    (found,) = (one for one in compiled(params, sim=sim).errors if one.code == "TF335")
-    assert [str(found.span), *(str(note.span) for note in found.notes)] == places
+    (finding,) = (one for one in compiled(params, sim=sim).errors if one.code == "TF335")
+    assert [str(finding.span), *(str(note.span) for note in finding.notes)] == places
     over = compiled("{file: sim.yaml, use_sim_time: false}", sim=sim)
-    assert "TF335" not in {one.code for one in over.found}
+    assert "TF335" not in {one.code for one in over.findings}
 
 
 def test_a_name_in_the_file_is_the_full_one_with_and_without_a_leading_slash() -> None:
@@ -174,9 +174,9 @@ def test_the_digest_of_the_plan_changes_with_the_file() -> None:
 def test_what_is_no_parameter_of_the_node_is_a_finding(
     params: str, file: str, code: str, message: str
 ) -> None:
-    found = compiled(params, q=file).found
-    assert [one.code for one in found] == [code], [one.message for one in found]
-    assert message in found[0].message
+    findings = compiled(params, q=file).findings
+    assert [one.code for one in findings] == [code], [one.message for one in findings]
+    assert message in findings[0].message
 
 
 def test_of_several_files_one_need_not_name_the_node_but_none_is_a_warning_for_each() -> None:
@@ -184,11 +184,11 @@ def test_of_several_files_one_need_not_name_the_node_but_none_is_a_warning_for_e
         "q": "/**/planner: {ros__parameters: {a: 1}}",
         "common": "other: {ros__parameters: {a: 1}}",
     }
-    assert compiled("{file: [common.yaml, q.yaml]}", **files).found == ()
+    assert compiled("{file: [common.yaml, q.yaml]}", **files).findings == ()
     files["q"] = files["common"]
-    found = compiled("{file: [common.yaml, q.yaml]}", **files).found
-    assert [(one.code, one.severity) for one in found] == [("TF334", "warning")] * 2
-    first, second = (one.span.column for one in found if one.span)
+    findings = compiled("{file: [common.yaml, q.yaml]}", **files).findings
+    assert [(one.code, one.severity) for one in findings] == [("TF334", "warning")] * 2
+    first, second = (one.span.column for one in findings if one.span)
     assert second - first == len("common.yaml, ")
 
 
@@ -212,8 +212,8 @@ def test_an_alias_bomb_is_refused() -> None:
 def test_an_alias_inside_what_it_names_is_a_finding(text: str) -> None:
     with pytest.raises(RejectedError) as rejected:
         load_params(text, "p.yaml")
-    (found,) = rejected.value.findings
-    assert (found.code, found.span and found.span.file) == ("TF008", "p.yaml")
+    (finding,) = rejected.value.findings
+    assert (finding.code, finding.span and finding.span.file) == ("TF008", "p.yaml")
 
 
 @pytest.mark.parametrize(

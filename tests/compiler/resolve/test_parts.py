@@ -93,7 +93,7 @@ def codes(result: Compiled) -> set[str]:
 
 def only(result: Compiled, code: str) -> Any:
     assert codes(result) == {code}, [(one.code, one.message) for one in result.errors]
-    return next(one for one in result.found if one.code == code)
+    return next(one for one in result.findings if one.code == code)
 
 
 def test_a_component_of_a_part_is_in_the_container_of_the_part() -> None:
@@ -410,21 +410,25 @@ def test_a_clock_of_the_parts_own_is_refused() -> None:
 
 def test_a_fault_in_the_parts_file_is_reported_there_and_names_the_part() -> None:
     rover = ROVER.replace("xyz: [0, 0.2, 0]", "xyz: [0, 0.2]")
-    found, *others = (
-        one for one in compiled(FLEET, **{"robots/rover_yaml": rover}).found if one.code == "TF103"
+    finding, *others = (
+        one
+        for one in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
+        if one.code == "TF103"
     )
-    assert found.span
-    assert found.span.file == "robots/rover.yaml"
-    assert [note.message for note in found.notes][-2:] == ["as the part one", "as the part two"]
+    assert finding.span
+    assert finding.span.file == "robots/rover.yaml"
+    assert [note.message for note in finding.notes][-2:] == ["as the part one", "as the part two"]
     assert not others
 
 
 def test_a_finding_of_a_rule_about_the_parts_file_names_the_parts() -> None:
     rover = ROVER.replace("wheel_link: {}", "wheel_lnk: {}")
-    found = next(
-        one for one in compiled(FLEET, **{"robots/rover_yaml": rover}).found if one.code == "TF203"
+    finding = next(
+        one
+        for one in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
+        if one.code == "TF203"
     )
-    assert [note.message for note in found.notes if note.message.startswith("as the part")] == [
+    assert [note.message for note in finding.notes if note.message.startswith("as the part")] == [
         "as the part one",
         "as the part two",
     ]
@@ -445,7 +449,7 @@ def test_a_comment_in_the_parts_file_allows_its_finding() -> None:
         "  idle: {external: true} # tfcompose: allow TF815 because it logs\n  slam: {run",
     )
     assert "TF815" not in {
-        one.code for one in compiled(FLEET, **{"robots/rover_yaml": rover}).found
+        one.code for one in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
     }
 
 

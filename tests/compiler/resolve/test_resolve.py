@@ -79,8 +79,8 @@ def test_poses_relative_to_each_other_are_one_finding(count: int) -> None:
     frames = ", ".join(
         f"f{n}: {{parent: base_link, relative_to: f{(n + 1) % count}}}" for n in range(count)
     )
-    found = compiled(f"frames: {{{frames}}}\n").found
-    assert [one.code for one in found] == ["TF404"]
+    findings = compiled(f"frames: {{{frames}}}\n").findings
+    assert [one.code for one in findings] == ["TF404"]
 
 
 @pytest.mark.parametrize("frame", ["c_link", "c_color_optical_frame", "c_bottom_screw_frame"])
@@ -239,12 +239,12 @@ def test_a_sensors_frame_takes_the_units_own_rotation_and_keeps_the_presets_plac
 
 def test_to_place_through_nominal_values_is_a_warning_that_the_units_own_values_silence() -> None:
     place = "place: c_color_frame"
-    assert [one.code for one in compiled(CAMERA % place).found] == ["TF405"]
+    assert [one.code for one in compiled(CAMERA % place).findings] == ["TF405"]
     assert not compiled(
         CAMERA % f"{place}, frames: {{c_color_frame: {{xyz: [0, 0.0149, 0]}}}}"
-    ).found
-    assert not compiled(CAMERA % f"{place}, tf: tfcompose").found
-    assert not compiled(CAMERA % "place: c_link").found
+    ).findings
+    assert not compiled(CAMERA % f"{place}, tf: tfcompose").findings
+    assert not compiled(CAMERA % "place: c_link").findings
 
 
 def test_the_parameter_file_is_yaml_that_says_the_same() -> None:
@@ -325,9 +325,9 @@ def test_joints_gets_its_parameters_on_its_command_line() -> None:
 def test_joints_takes_no_other_parameters_and_no_other_values(
     params: str, code: str, words: str
 ) -> None:
-    (found,) = compiled(f"processes: {{joints: {{params: {{{params}}}}}}}\n").errors
-    assert found.code == code
-    assert words in (found.help or "")
+    (finding,) = compiled(f"processes: {{joints: {{params: {{{params}}}}}}}\n").errors
+    assert finding.code == code
+    assert words in (finding.help or "")
 
 
 def test_names_are_below_the_namespace_unless_they_begin_with_a_slash() -> None:
@@ -388,8 +388,8 @@ def test_a_fixed_edge_has_the_name_of_a_joint_where_one_is_given() -> None:
 
 @pytest.mark.parametrize("parents", ["[]", "[base_link, base_link]", "[base_link, 3]"])
 def test_a_list_of_parents_has_different_names(parents: str) -> None:
-    found = compiled(TOOL.replace("[base_link, rack]", parents)).found
-    assert [one.code for one in found if one.code.startswith("TF1")] != []
+    findings = compiled(TOOL.replace("[base_link, rack]", parents)).findings
+    assert [one.code for one in findings if one.code.startswith("TF1")] != []
 
 
 def test_a_frame_that_a_driver_sends_again_and_again_inside_a_sensor_can_be_placed() -> None:

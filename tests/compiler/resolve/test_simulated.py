@@ -106,9 +106,9 @@ def test_without_limits_a_rotation_sweeps_all_round_and_a_slide_stays() -> None:
 
 
 def test_a_slide_without_limits_cannot_sweep() -> None:
-    (found,) = compile_robot(UNLIMITED % "{lift: sweep}", "arm.yaml", library()).errors
-    assert found.code == "TF106"
-    assert "lift" in words(found)
+    (finding,) = compile_robot(UNLIMITED % "{lift: sweep}", "arm.yaml", library()).errors
+    assert finding.code == "TF106"
+    assert "lift" in words(finding)
 
 
 @pytest.mark.parametrize(
@@ -123,9 +123,9 @@ def test_a_slide_without_limits_cannot_sweep() -> None:
     ],
 )
 def test_what_is_not_understood_is_refused_once(source_text: str, code: str, words: str) -> None:
-    (found,) = compiled(source_text).errors
-    assert found.code == code
-    assert words in (found.help or "")
+    (finding,) = compiled(source_text).errors
+    assert finding.code == code
+    assert words in (finding.help or "")
 
 
 @pytest.mark.parametrize(

@@ -84,8 +84,8 @@ def test_the_joints_that_there_are_are_named_in_the_files_order_and_not_all_of_a
     links = "".join(f"  {one}_link: {{}}\n" for one in names)
     control = "ros2_control: {h: {plugin: a/B, joints: {gripper: {state: [position]}}}}\n"
     text = f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{links}joints:\n{joints}{control}"
-    (found,) = compile_robot(text, "r.yaml", library()).errors
-    assert found.help.endswith(" j0, j1, j2, j3, j4, j5, j6, j7 and 92 more")
+    (finding,) = compile_robot(text, "r.yaml", library()).errors
+    assert finding.help.endswith(" j0, j1, j2, j3, j4, j5, j6, j7 and 92 more")
 
 
 def test_a_raw_block_is_emitted_as_it_stands_in_both_files() -> None:
@@ -138,9 +138,9 @@ def test_a_finding_in_a_block_has_the_line_of_the_robot_file(
     source_text: str, place: tuple[int, int]
 ) -> None:
     compiled = compile_robot(HEAD + f"xml:\n  wheels: {source_text}", "r.yaml", library())
-    (found,) = compiled.errors
-    assert found.span
-    assert (found.code, found.span.line, found.span.column) == ("TF203", *place)
+    (finding,) = compiled.errors
+    assert finding.span
+    assert (finding.code, finding.span.line, finding.span.column) == ("TF203", *place)
 
 
 def test_a_block_cannot_bring_entities_or_end_the_robot() -> None:
@@ -166,7 +166,7 @@ processes: {x: {external: true}}
         for side, file in (("left", "red.yaml"), ("right", "dark.yaml"))
     )
     compiled = compile_robot(holder, "r.yaml", library(), read=texts.__getitem__)
-    assert not compiled.found, compiled.found
+    assert not compiled.findings, compiled.findings
     assert compiled.robot
     urdf = ET.fromstring(next(f.text for f in emit(compiled.robot) if f.path == "robot.urdf"))  # noqa: S314 (ours)
     names = [one.get("name") for one in urdf.findall("ros2_control")]
@@ -187,5 +187,5 @@ def test_a_prefix_is_declared_by_any_element_around_it() -> None:
     inner = '<gazebo><a xmlns:x="u"><x:b x:c="1"/></a></gazebo>'
     assert not compile_robot(HEAD + f"xml:\n  a: '{inner}'\n", "r.yaml", library()).errors
     neighbour = '<gazebo><a xmlns:x="u"/><x:b/></gazebo>'
-    (found,) = compile_robot(HEAD + f"xml:\n  a: '{neighbour}'\n", "r.yaml", library()).errors
-    assert found.code == "TF719"
+    (finding,) = compile_robot(HEAD + f"xml:\n  a: '{neighbour}'\n", "r.yaml", library()).errors
+    assert finding.code == "TF719"

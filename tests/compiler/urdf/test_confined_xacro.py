@@ -47,22 +47,22 @@ def lint(*lines: str, file: str = "r.xacro", **how: Any) -> list[Finding]:
     return lint_urdf(write(*lines, file=file), Packages(disk(**how)))
 
 
-def place(found: Finding) -> str:
-    return str(found.span)
+def place(finding: Finding) -> str:
+    return str(finding.span)
 
 
 @pytest.mark.parametrize("expression", [LAMBDA, GENERATOR, FRAME])
 def test_an_expression_that_leads_to_python_is_refused_where_it_is(expression: str) -> None:
-    (found,) = lint('<link name="a"/>', f'<link name="${{{expression}}}"/>')
-    assert (found.code, place(found)) == ("TF022", "r.xacro:3:13")
+    (finding,) = lint('<link name="a"/>', f'<link name="${{{expression}}}"/>')
+    assert (finding.code, place(finding)) == ("TF022", "r.xacro:3:13")
     assert not Path("made").exists()
 
 
 def test_an_expression_of_a_macro_that_leads_to_python_is_refused_in_the_macro() -> None:
     macro = f'<xacro:macro name="m" params="">\n<link name="${{{LAMBDA}}}"/></xacro:macro>'
     write(macro, file="lib.xacro")
-    (found,) = lint('<xacro:include filename="lib.xacro"/>', "<xacro:m/>")
-    assert (found.code, place(found)) == ("TF022", "lib.xacro:3:13")
+    (finding,) = lint('<xacro:include filename="lib.xacro"/>', "<xacro:m/>")
+    assert (finding.code, place(finding)) == ("TF022", "lib.xacro:3:13")
 
 
 @pytest.mark.parametrize("expression", [LAMBDA, GENERATOR])
@@ -70,8 +70,8 @@ def test_the_kernel_holds_what_passes_the_check_of_names(
     expression: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(expand, "PROCESS", "tests.support.unchecked_xacro")
-    found = lint(f'<link name="a${{{expression}}}"/>')
-    assert {one.code for one in found} <= {"TF209", "TF501"}  # it goes on: system() failed
+    findings = lint(f'<link name="a${{{expression}}}"/>')
+    assert {one.code for one in findings} <= {"TF209", "TF501"}  # it goes on: system() failed
     assert not Path("made").exists()
 
 
@@ -80,9 +80,9 @@ def test_the_kernel_lets_an_expression_open_no_file(monkeypatch: pytest.MonkeyPa
     Path("kept").write_text("kept", "utf-8")
     for file in ("/etc/passwd", "kept"):
         opened = f"(lambda: {SYSTEM}['open']('{file}', 0))()"
-        (found,) = lint(f'<link name="${{{opened}}}"/>')
-        assert found.code == "TF018"
-        assert "Operation not permitted" in found.message
+        (finding,) = lint(f'<link name="${{{opened}}}"/>')
+        assert finding.code == "TF018"
+        assert "Operation not permitted" in finding.message
 
 
 READS = [
@@ -109,17 +109,17 @@ def test_what_lies_outside_of_the_tree_is_not_read(read: str, named: str, tmp_pa
     Path("link.yaml").symlink_to(tmp_path / "secret.yaml")
     Path(".git").mkdir()
     Path(".git/config").write_text(HIDDEN, "utf-8")
-    (found,) = lint('<link name="a"/>', read.format(named))
-    assert found.code == "TF021"
-    assert found.span
-    assert (found.span.file, found.span.line) == ("r.xacro", 3)
-    assert HIDDEN not in str(found)
+    (finding,) = lint('<link name="a"/>', read.format(named))
+    assert finding.code == "TF021"
+    assert finding.span
+    assert (finding.span.file, finding.span.line) == ("r.xacro", 3)
+    assert HIDDEN not in str(finding)
 
 
 @pytest.mark.parametrize("pattern", ["/etc/pass*", "../*.yaml", "/proc/*/environ"])
 def test_folders_outside_of_the_tree_are_not_listed(pattern: str) -> None:
-    (found,) = lint(f'<xacro:include filename="{pattern}"/>')
-    assert (found.code, found.span and found.span.line) == ("TF021", 2)
+    (finding,) = lint(f'<xacro:include filename="{pattern}"/>')
+    assert (finding.code, finding.span and finding.span.line) == ("TF021", 2)
 
 
 def test_patterns_of_the_tree_are_expanded_in_order() -> None:
@@ -137,8 +137,8 @@ def test_patterns_of_the_tree_are_expanded_in_order() -> None:
 
 
 def test_a_refused_file_is_named_even_where_the_document_does_without_it() -> None:
-    (found,) = lint('<xacro:include filename="/etc/passwd" optional="true"/>')
-    assert found.code == "TF021"
+    (finding,) = lint('<xacro:include filename="/etc/passwd" optional="true"/>')
+    assert finding.code == "TF021"
 
 
 def test_an_optional_file_may_be_missing_where_arguments_are_given() -> None:
@@ -154,21 +154,21 @@ def test_a_path_is_no_package(name: str, tmp_path: Path, monkeypatch: pytest.Mon
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / "a.yaml").write_text(HIDDEN, "utf-8")
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
-    (found,) = lint(f"<link name=\"${{xacro.load_yaml('$(find {name})/a.yaml')}}\"/>")
-    assert (found.code, found.span and found.span.line) == ("TF724", 2)
+    (finding,) = lint(f"<link name=\"${{xacro.load_yaml('$(find {name})/a.yaml')}}\"/>")
+    assert (finding.code, finding.span and finding.span.line) == ("TF724", 2)
 
 
 def test_a_manifest_that_has_no_end_is_not_read(tmp_path: Path) -> None:
     for name, target in (("a", "/dev/zero"), ("b", "/etc/passwd")):
         (tmp_path / name).mkdir()
         (tmp_path / name / "package.xml").symlink_to(target)
-    found = part_of(
+    findings = part_of(
         "packages: {p: ../a}\nparts: {arm: {xacro: ../a/arm.xacro, parent: base_link}}"
     )
-    assert [one.code for one in found] == ["TF001"]
+    assert [one.code for one in findings] == ["TF001"]
     write("<link name=\"${xacro.load_yaml('$(find p)/a.yaml')}\"/>", file="arm.xacro")
-    found = part_of("packages: {p: ../a}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}")
-    assert [one.code for one in found] == ["TF021"]
+    findings = part_of("packages: {p: ../a}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}")
+    assert [one.code for one in findings] == ["TF021"]
 
 
 def test_with_trust_everything_is_read_and_expressions_are_not_confined(tmp_path: Path) -> None:
@@ -184,7 +184,7 @@ def part_of(robot: str, file: str = "robot.yaml") -> list[Finding]:
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     Path(file).write_text(text, "utf-8")
     return list(
-        compile_robot(text, file, library(), read=read_text, disk=disk(sources=[file])).found
+        compile_robot(text, file, library(), read=read_text, disk=disk(sources=[file])).findings
     )
 
 
@@ -201,9 +201,9 @@ def test_a_part_may_be_anywhere_in_the_repository_of_the_robot_file() -> None:
 def test_a_part_that_lies_elsewhere_is_refused_and_not_shown(named: str, tmp_path: Path) -> None:
     (tmp_path / "secret.xacro").write_text(HIDDEN, "utf-8")
     write(file=str(tmp_path / "elsewhere/r.xacro"))
-    (found,) = part_of(f"parts:\n  arm: {{xacro: {named}, parent: base_link}}")
-    assert (found.code, place(found)) == ("TF021", "robot.yaml:5:16")
-    assert HIDDEN not in str(found)
+    (finding,) = part_of(f"parts:\n  arm: {{xacro: {named}, parent: base_link}}")
+    assert (finding.code, place(finding)) == ("TF021", "robot.yaml:5:16")
+    assert HIDDEN not in str(finding)
 
 
 def test_a_part_of_a_package_elsewhere_is_taken(tmp_path: Path) -> None:
@@ -232,10 +232,10 @@ def test_a_folder_that_a_robot_calls_a_package_has_to_be_one(
         + "<link name=\"${xacro.load_yaml('$(find secrets)/a.yaml').name}\"/></robot>",
         "utf-8",
     )
-    found = part_of(
+    findings = part_of(
         "packages: {secrets: ../secrets}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}"
     )
-    assert [one.code for one in found] == codes
+    assert [one.code for one in findings] == codes
 
 
 def test_what_xacro_prints_is_shown_without_control_characters(
@@ -259,9 +259,11 @@ def test_a_flood_of_output_is_bounded(capsys: pytest.CaptureFixture[str]) -> Non
 def test_a_macro_bomb_is_ended_and_found_in_its_macro(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(confined, "MOST_WALL_S", 4.0)
     call = '<xacro:if value="${n > 0}"><xacro:m n="${n - 1}"/><xacro:m n="${n - 1}"/></xacro:if>'
-    (found,) = lint(f'<xacro:macro name="m" params="n">{call}</xacro:macro>', '<xacro:m n="30"/>')
-    assert (found.code, found.span and found.span.line) == ("TF008", 2)
-    assert "3 s" in found.message
+    (finding,) = lint(
+        f'<xacro:macro name="m" params="n">{call}</xacro:macro>', '<xacro:m n="30"/>'
+    )
+    assert (finding.code, finding.span and finding.span.line) == ("TF008", 2)
+    assert "3 s" in finding.message
 
 
 OF_FILE = {
@@ -363,8 +365,8 @@ def test_what_such_a_process_sends_is_refused(
     monkeypatch.setattr(expand, "PROCESS", "tests.support.hostile_child")
     text = "".join(json.dumps(line) + "\n" for line in HOSTILE[name])
     Path("hostile.jsonl").write_text(text, "utf-8")
-    (found,) = lint()
-    assert (found.code, found.span and found.span.file) == (code, "r.xacro")
+    (finding,) = lint()
+    assert (finding.code, finding.span and finding.span.file) == (code, "r.xacro")
 
 
 #: Lets a program believe that the kernel does not have these calls, as an older one.

@@ -26,8 +26,8 @@ def lint(*lines: str, file: str = "r.xacro") -> list[Finding]:
     return lint_urdf(file, Packages(disk()))
 
 
-def place(found: Finding) -> str:
-    return str(found.span)
+def place(finding: Finding) -> str:
+    return str(finding.span)
 
 
 EXPRESSIONS = {
@@ -38,21 +38,21 @@ EXPRESSIONS = {
 
 @pytest.mark.parametrize("line", EXPRESSIONS.values(), ids=EXPRESSIONS)
 def test_an_expression_that_asks_for_too_much_is_found_where_it_is(line: str) -> None:
-    (found,) = lint(line)
-    assert (found.code, place(found)) == ("TF008", "r.xacro:2:13")
-    assert "xacro r.xacro > robot.urdf" in found.help
+    (finding,) = lint(line)
+    assert (finding.code, place(finding)) == ("TF008", "r.xacro:2:13")
+    assert "xacro r.xacro > robot.urdf" in finding.help
 
 
 @pytest.mark.slow
 def test_an_expression_that_does_not_end_is_ended() -> None:
-    (found,) = lint('<link name="a"/>', '<link name="${9**9**9}"/>')
-    assert (found.code, place(found)) == ("TF008", "r.xacro:3:13")
-    assert "${9**9**9}" in found.message
+    (finding,) = lint('<link name="a"/>', '<link name="${9**9**9}"/>')
+    assert (finding.code, place(finding)) == ("TF008", "r.xacro:3:13")
+    assert "${9**9**9}" in finding.message
 
 
 def test_a_text_that_no_reader_takes_is_not_made() -> None:
-    (found,) = lint("<link name=\"${'a' * 10 ** 8}\"/>")
-    assert (found.code, "100,000," in found.message) == ("TF008", True)
+    (finding,) = lint("<link name=\"${'a' * 10 ** 8}\"/>")
+    assert (finding.code, "100,000," in finding.message) == ("TF008", True)
 
 
 def test_a_macro_that_calls_itself_is_found_with_its_name() -> None:
@@ -60,17 +60,17 @@ def test_a_macro_that_calls_itself_is_found_with_its_name() -> None:
         '<xacro:macro name="m" params="n"><link name="l${n}"/><xacro:m n="${n +'
         ' 1}"/></xacro:macro>'
     )
-    (found,) = lint(macro, '<xacro:m n="1"/>')
-    assert (found.code, place(found)) == ("TF008", "r.xacro:2:54")
-    assert [note.message.split()[-1] for note in found.notes] == ["m"]
+    (finding,) = lint(macro, '<xacro:m n="1"/>')
+    assert (finding.code, place(finding)) == ("TF008", "r.xacro:2:54")
+    assert [note.message.split()[-1] for note in finding.notes] == ["m"]
 
 
 @pytest.mark.slow
 def test_a_macro_of_hundred_million_elements_is_ended() -> None:
     call = '<xacro:if value="${n > 0}"><xacro:m n="${n - 1}"/><xacro:m n="${n - 1}"/></xacro:if>'
     macro = f'<xacro:macro name="m" params="n"><link name="l${{n}}"/>{call}</xacro:macro>'
-    (found,) = lint(macro, '<xacro:m n="27"/>')
-    assert (found.code, found.span and found.span.line) == ("TF008", 2)
+    (finding,) = lint(macro, '<xacro:m n="27"/>')
+    assert (finding.code, finding.span and finding.span.line) == ("TF008", 2)
 
 
 @pytest.mark.parametrize(
@@ -80,18 +80,18 @@ def test_a_macro_of_hundred_million_elements_is_ended() -> None:
 def test_what_is_no_plain_file_is_not_read(include: str, named: str) -> None:
     os.mkfifo("fifo")
     Path("folder").mkdir()
-    (found,) = lint('<link name="a"/>', include.format(named))
-    assert found.code == "TF018"
-    assert named in found.message
-    assert found.span
-    assert (found.span.file, found.span.line) == ("r.xacro", 3)
+    (finding,) = lint('<link name="a"/>', include.format(named))
+    assert finding.code == "TF018"
+    assert named in finding.message
+    assert finding.span
+    assert (finding.span.file, finding.span.line) == ("r.xacro", 3)
 
 
 def test_a_file_that_includes_itself_is_found() -> None:
     Path("other.xacro").write_text(HEAD + '<xacro:include filename="r.xacro"/></robot>', "utf-8")
-    (found,) = lint('<xacro:include filename="other.xacro"/>')
-    assert found.code == "TF008"
-    assert {"r.xacro", "other.xacro"} <= set(found.message.split())
+    (finding,) = lint('<xacro:include filename="other.xacro"/>')
+    assert finding.code == "TF008"
+    assert {"r.xacro", "other.xacro"} <= set(finding.message.split())
 
 
 def test_an_include_of_a_package_that_is_not_there_is_found_at_the_include() -> None:
@@ -99,19 +99,19 @@ def test_an_include_of_a_package_that_is_not_there_is_found_at_the_include() -> 
     Path("inner/a.xacro").write_text(
         HEAD + ' <xacro:include filename="$(find nowhere)/b.xacro"/></robot>', "utf-8"
     )
-    (found,) = lint('<xacro:include filename="inner/a.xacro"/>')
-    assert (found.code, place(found)) == ("TF724", "inner/a.xacro:2:27")
+    (finding,) = lint('<xacro:include filename="inner/a.xacro"/>')
+    assert (finding.code, place(finding)) == ("TF724", "inner/a.xacro:2:27")
 
 
 def test_an_argument_without_a_value_is_found_where_it_is_used() -> None:
-    (found,) = lint('<link name="$(arg side)_a"/>')
-    assert (found.code, place(found)) == ("TF106", "r.xacro:2:13")
+    (finding,) = lint('<link name="$(arg side)_a"/>')
+    assert (finding.code, place(finding)) == ("TF106", "r.xacro:2:13")
 
 
 def test_broken_xml_of_an_included_file_is_found_there() -> None:
     Path("inner.xacro").write_text(HEAD + "<link>\n</robot>", "utf-8")
-    (found,) = lint('<xacro:include filename="inner.xacro"/>')
-    assert (found.code, place(found)) == ("TF018", "inner.xacro:3:3")
+    (finding,) = lint('<xacro:include filename="inner.xacro"/>')
+    assert (finding.code, place(finding)) == ("TF018", "inner.xacro:3:3")
 
 
 INNER = (
@@ -125,13 +125,13 @@ INNER = (
 def test_each_finding_is_in_the_file_and_line_that_people_have() -> None:
     Path("lib").mkdir()
     Path("lib/wheel.xacro").write_text(INNER.replace('<link name="base_link"/>', ""), "utf-8")
-    found = lint(
+    findings = lint(
         '<xacro:include filename="lib/wheel.xacro"/>',
         '<xacro:wheel side="left"><origin xyz="0 0"/></xacro:wheel>',
         '<xacro:wheel side="right"><origin rpy="${1 + 1} 0 0"/></xacro:wheel>',
         '<gazebo reference="nobody"/>',
     )
-    assert {(one.code, place(one)) for one in found} == {
+    assert {(one.code, place(one)) for one in findings} == {
         ("TF721", "r.xacro:3:39"),
         ("TF203", "lib/wheel.xacro:4:58"),
         ("TF203", "r.xacro:5:20"),
@@ -139,8 +139,8 @@ def test_each_finding_is_in_the_file_and_line_that_people_have() -> None:
 
 
 def test_an_element_that_xacro_names_is_found_where_it_names_it() -> None:
-    found = lint("<xacro:element xacro:name=\"${'li' + 'nk'}\" name=\"a b\"/>")
-    assert {place(one) for one in found if one.code == "TF501"} == {"r.xacro:2:50"}
+    findings = lint("<xacro:element xacro:name=\"${'li' + 'nk'}\" name=\"a b\"/>")
+    assert {place(one) for one in findings if one.code == "TF501"} == {"r.xacro:2:50"}
 
 
 HARDWARE = """<xacro:macro name="drive" params="joint">
@@ -152,8 +152,8 @@ HARDWARE = """<xacro:macro name="drive" params="joint">
 
 
 def test_a_joint_of_hardware_is_found_in_the_macro() -> None:
-    (found,) = lint(HARDWARE)
-    assert (found.code, place(found)) == ("TF703", "r.xacro:4:18")
+    (finding,) = lint(HARDWARE)
+    assert (finding.code, place(finding)) == ("TF703", "r.xacro:4:18")
 
 
 def test_a_relative_mesh_begins_at_the_document_and_not_at_what_it_includes() -> None:
@@ -167,4 +167,4 @@ def test_a_relative_mesh_begins_at_the_document_and_not_at_what_it_includes() ->
     document = read_urdf("r.xacro", Packages(disk()))
     (shape,) = document.robot.links["a"].visuals
     assert shape.mesh is not None
-    assert (shape.mesh.path, str(shape.mesh.at)) == ("a.stl", "lib/a.xacro:2:50")
+    assert (shape.mesh.path, str(shape.mesh.span)) == ("a.stl", "lib/a.xacro:2:50")

@@ -44,7 +44,7 @@ def lint_urdf(file: str) -> list[Finding]:
 
 def lint_text(text: str) -> tuple[Finding, ...]:
     try:
-        return robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset).found
+        return robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset).findings
     except RejectedError as error:
         return error.findings
 
@@ -58,8 +58,8 @@ def test_each_marked_line_gives_its_findings_and_no_other_line_gives_one(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", "/nowhere")
-    found = lint_urdf(str(file))
-    assert [(one.span.line, one.code) for one in found if one.span] == marks(
+    findings = lint_urdf(str(file))
+    assert [(one.span.line, one.code) for one in findings if one.span] == marks(
         file.read_text("utf-8")
     )
 
@@ -79,7 +79,7 @@ def test_each_finding_points_at_the_word_that_is_wrong(file: Path) -> None:
 
 
 def test_the_nearest_name_is_the_advice() -> None:
-    found = [one for file in FILES for one in lint_urdf(str(file))]
+    findings = [one for file in FILES for one in lint_urdf(str(file))]
     for code, name, near in (
         ("TF720", "orign", "origin"),
         ("TF720", "xzy", "xyz"),
@@ -88,7 +88,7 @@ def test_the_nearest_name_is_the_advice() -> None:
     ):
         (advice,) = {
             one.help
-            for one in found
+            for one in findings
             if one.code == code and re.search(rf"\b{name}\b", one.message)
         }
         assert re.search(rf"\b{near}\b", advice), name
@@ -110,11 +110,11 @@ def test_what_build_writes_has_no_findings(robot: str, tmp_path: Path) -> None:
     for file in emit(compiled.robot):
         if file.path.endswith(".urdf"):
             (tmp_path / file.path).write_text(file.text, encoding="utf-8")
-            found = lint_urdf(str(tmp_path / file.path))
+            findings = lint_urdf(str(tmp_path / file.path))
             root_body = (
                 {"TF712"} if file.path == "robot.urdf" and robot == "autonomous_robot" else set()
             )
-            assert {one.code for one in found} == root_body
+            assert {one.code for one in findings} == root_body
 
 
 BOMB = (
@@ -143,8 +143,8 @@ REFUSED = {
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_is_no_urdf_or_could_do_harm_is_one_finding(what: str) -> None:
     text, output = REFUSED[what]
-    (found,) = lint_text(text)
-    assert output in found.message
+    (finding,) = lint_text(text)
+    assert output in finding.message
 
 
 @pytest.mark.parametrize("encoding", ["ISO-8859-1", "windows-1252", "GB2312"])
@@ -159,17 +159,17 @@ def test_a_file_is_read_in_the_encoding_that_it_declares(encoding: str, tmp_path
         ("TF501", True)
     ]
     file.write_bytes(file.read_bytes().replace(encoding.encode(), b"UTF-8"))
-    (found,) = lint_urdf(str(file))
-    assert (found.code, found.help[:16]) == ("TF001", "save it as UTF-8")
+    (finding,) = lint_urdf(str(file))
+    assert (finding.code, finding.help[:16]) == ("TF001", "save it as UTF-8")
 
 
 def test_where_a_tag_does_not_match_is_reported() -> None:
-    (found,) = lint_text(REFUSED["a tag that is not closed"][0])
-    assert found.code == "TF018"
-    assert found.span
-    assert found.span.line == 3
-    assert "<link>" in found.message
-    assert [note.span and note.span.line for note in found.notes] == [2]
+    (finding,) = lint_text(REFUSED["a tag that is not closed"][0])
+    assert finding.code == "TF018"
+    assert finding.span
+    assert finding.span.line == 3
+    assert "<link>" in finding.message
+    assert [note.span and note.span.line for note in finding.notes] == [2]
 
 
 def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Path) -> None:
@@ -207,10 +207,10 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
 def test_what_is_nearly_the_address_of_a_file_in_a_package_gets_the_right_form(
     source_text: str,
 ) -> None:
-    _, found = Packages(disk()).asset(source_text, Span("a.urdf"))
-    assert found
-    assert found.message.startswith(source_text)
-    assert found.help.endswith("package://mine/meshes/a.stl")
+    _, finding = Packages(disk()).asset(source_text, Span("a.urdf"))
+    assert finding
+    assert finding.message.startswith(source_text)
+    assert finding.help.endswith("package://mine/meshes/a.stl")
 
 
 def test_a_package_is_searched_where_ros_searches(
@@ -251,9 +251,9 @@ XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
 def test_a_xacro_file_is_expanded_and_places_are_those_in_it(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf.xacro"
     file.write_text(XACRO)
-    found = lint_urdf(str(file))
-    assert [one.code for one in found] == ["TF203"]
-    assert found[0].span == Span(str(file), 3, 53, 3, 61)
+    findings = lint_urdf(str(file))
+    assert [one.code for one in findings] == ["TF203"]
+    assert findings[0].span == Span(str(file), 3, 53, 3, 61)
     file.write_text(XACRO.replace("${n}", "${m}", 1))
     (refused,) = lint_urdf(str(file))
     assert refused.code == "TF018"
@@ -348,8 +348,8 @@ LEVELS = {
 def test_what_readers_take_is_a_warning_and_no_error(what: str, tmp_path: Path) -> None:
     inside, severity = LEVELS[what]
     (tmp_path / "r.urdf").write_text(f'<robot name="r"><link name="base_link"/>{inside}</robot>')
-    found = [one for one in lint_urdf(str(tmp_path / "r.urdf")) if one.code != "TF706"]
-    assert [one.severity for one in found] == [severity], [one.message for one in found]
+    findings = [one for one in lint_urdf(str(tmp_path / "r.urdf")) if one.code != "TF706"]
+    assert [one.severity for one in findings] == [severity], [one.message for one in findings]
 
 
 QUAT = """<robot name="r"{}><link name="base_link"/><link name="a"/><joint name="j" type="fixed">
@@ -374,8 +374,8 @@ def test_a_rotation_as_a_quaternion_is_read_and_is_one_finding(
 ) -> None:
     text = QUAT.format(version, origin)
     converted = robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset)
-    (found,) = converted.found
-    assert (found.code, found.severity, word in found.message) == ("TF721", severity, True)
+    (finding,) = converted.findings
+    assert (finding.code, finding.severity, word in finding.message) == ("TF721", severity, True)
     if ROTATION in origin:
         assert converted.robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
 
@@ -394,8 +394,8 @@ def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> N
     file.write_text(
         XACRO.replace('<link name="base_link"/>', "").replace('<xacro:leg n="1"/>', "")
     )
-    (found,) = lint_urdf(str(file))
-    assert (found.code, "leg" in words(found)) == ("TF206", True)
+    (finding,) = lint_urdf(str(file))
+    assert (finding.code, "leg" in words(finding)) == ("TF206", True)
 
 
 def test_a_xacro_file_that_cannot_be_read_is_refused_as_every_other(tmp_path: Path) -> None:
@@ -479,7 +479,7 @@ def test_characters_beyond_ascii_cost_no_more_than_others_and_places_are_right_a
     for first in ("u", "ü"):
         text = large(8000, first)
         began = time.process_time()
-        one, *_ = [found for found in lint_text(text) if "nmae" in found.message]
+        one, *_ = [finding for finding in lint_text(text) if "nmae" in finding.message]
         seconds[first] = time.process_time() - began
         assert one.span
         assert text[one.span.column - 1 : one.span.end_column - 1] in {"<joint", "end"}
@@ -502,8 +502,8 @@ def test_a_package_is_found_from_a_file_deep_inside_it(tmp_path: Path) -> None:
     (tmp_path / "package.xml").write_text("<package><name>mine</name></package>")
     (tmp_path / "a.stl").touch()
     deep = tmp_path / "robots" / "arms" / "long" / "urdf"
-    _, found = Packages(disk()).asset("package://mine/a.stl", Span(str(deep / "a.urdf")))
-    assert found is None
+    _, finding = Packages(disk()).asset("package://mine/a.stl", Span(str(deep / "a.urdf")))
+    assert finding is None
 
 
 def test_a_number_that_no_robot_has_is_refused() -> None:
@@ -516,7 +516,7 @@ def test_a_number_that_no_robot_has_is_refused() -> None:
     found = {
         size: {
             one.code
-            for one in robot_of(read_xml(urdf.format(size), "r"), "r", Packages().asset).found
+            for one in robot_of(read_xml(urdf.format(size), "r"), "r", Packages().asset).findings
         }
         for size in ("1e29", "1e31", "-1e31")
     }

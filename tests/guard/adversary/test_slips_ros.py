@@ -77,9 +77,9 @@ def robot(
 
 
 def pid_in(line: str) -> int:
-    found = re.search(r"pid (\d+)", line)
-    assert found, line
-    return int(found[1])
+    match = re.search(r"pid (\d+)", line)
+    assert match, line
+    return int(match[1])
 
 
 def stopped(robot: Robot, name: str) -> bool:

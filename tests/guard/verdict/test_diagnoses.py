@@ -36,12 +36,12 @@ JOINT_STATE, CLOCK = "sensor_msgs/msg/JointState", "rosgraph_msgs/msg/Clock"
 
 
 def codes(state: TreeState) -> set[str]:
-    return {found.code for found in diagnose(state)}
+    return {finding.code for finding in diagnose(state)}
 
 
 def only(state: TreeState) -> Finding:
-    (found,) = diagnose(state)
-    return found
+    (finding,) = diagnose(state)
+    return finding
 
 
 def data(frame: str, delay_s: float, topic: str = "/scan") -> tuple[StampedData]:
@@ -358,8 +358,8 @@ BY_PLAN: dict[str, tuple[TreeHistory, str, list[str]]] = {
 @pytest.mark.parametrize("case", BY_PLAN)
 def test_with_a_plan_what_differs_from_it_is_found(case: str) -> None:
     history, code, names = BY_PLAN[case]
-    (found,) = [one for one in diagnose(history.observed(plan=sound_plan())) if one.code == code]
-    expect(found, code, *names)
+    (finding,) = [one for one in diagnose(history.observed(plan=sound_plan())) if one.code == code]
+    expect(finding, code, *names)
 
 
 def test_a_frame_that_goes_from_node_to_node_is_reported_once() -> None:
@@ -375,9 +375,9 @@ def test_of_a_frame_with_very_many_parents_some_are_named() -> None:
     history = TreeHistory()
     for index in range(60):
         history.fixed(f"parent{index:02} cup")
-    (found,) = [one for one in diagnose(history.observed()) if one.code == "TF802"]
-    expect(found, "TF802", "cup", "60", "parent00 (from /static)", "parent01 (from /static)")
-    assert len(found.notes) < 10
+    (finding,) = [one for one in diagnose(history.observed()) if one.code == "TF802"]
+    expect(finding, "TF802", "cup", "60", "parent00 (from /static)", "parent01 (from /static)")
+    assert len(finding.notes) < 10
 
 
 def test_stamps_that_stand_with_the_clock_are_reported_of_the_clock_alone() -> None:
@@ -397,9 +397,9 @@ def test_stamps_that_stand_with_the_clock_are_reported_of_the_clock_alone() -> N
     [(37.0, "TAI"), (18.1, "GPS"), (3600.0, "local time"), (-7200.0, "local time"), (60.0, "")],
 )
 def test_a_clock_that_is_off_by_a_known_offset_is_named(ahead_s: float, name: str) -> None:
-    found = only(stamped(-ahead_s).observed())
-    assert found.code == "TF825"
-    assert (name in found.message) if name else ("(" not in found.message)
+    finding = only(stamped(-ahead_s).observed())
+    assert finding.code == "TF825"
+    assert (name in finding.message) if name else ("(" not in finding.message)
 
 
 def test_stamps_that_are_the_age_of_this_machine_are_named() -> None:
@@ -495,7 +495,7 @@ def test_processes_with_other_settings_cannot_be_heard_and_why_is_reported() -> 
     )
     observed = TreeState(1.0, settings={**ours, "RMW_IMPLEMENTATION": "b"})
     other = RosProcess(9, "nav", {**ours, "ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"})
-    [found] = [
+    [finding] = [
         one for one in diagnose(replace(observed, processes=(other,))) if one.code == "TF908"
     ]
     names = (
@@ -504,7 +504,7 @@ def test_processes_with_other_settings_cannot_be_heard_and_why_is_reported() -> 
         "ROS_DOMAIN_ID is 7",
         "RMW_IMPLEMENTATION is b",
     )
-    expect(found, "TF908", *names, "ROS_DOMAIN_ID=8 RMW_IMPLEMENTATION=a tfcompose doctor")
+    expect(finding, "TF908", *names, "ROS_DOMAIN_ID=8 RMW_IMPLEMENTATION=a tfcompose doctor")
 
 
 @pytest.mark.parametrize(
@@ -553,13 +553,13 @@ def test_two_publishers_of_one_node_are_each_reported_with_their_edges() -> None
     tree = TreeHistory().knows(b"d", b"e").fixed("base_link laser")
     for edge, gid in (("odom base_link", b"d"), ("base_link arm", b"e")):
         tree.moving(edge, gid, stamp=late(-0.5))
-    found = [one for one in diagnose(tree.observed()) if one.code == "TF835"]
-    assert len(found) == 2
+    findings = [one for one in diagnose(tree.observed()) if one.code == "TF835"]
+    assert len(findings) == 2
 
 
 @pytest.mark.parametrize("node", ["", "/flood"])
 def test_a_flood_is_reported_also_of_a_publisher_that_has_no_name(node: str) -> None:
     state = sound_tree().observed(beyond={b"f": 7})
     state = replace(state, publishers=(*state.publishers, Publisher(b"f", node, static=False)))
-    (found,) = [one for one in diagnose(state) if one.code == "TF853"]
-    assert found.message.startswith(node or NAMELESS)
+    (finding,) = [one for one in diagnose(state) if one.code == "TF853"]
+    assert finding.message.startswith(node or NAMELESS)

@@ -7,7 +7,7 @@ import pytest
 from tests.support.tree_history import SECOND_NS, sound_plan, sound_tree
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.verdict.doctor import diagnose
-from tfcompose.guard.verdict.joints import sent_twice, unknown_joints
+from tfcompose.guard.verdict.joints import find_sent_twice, unknown_joints
 from tfcompose.model.plan import PlanEdge, PlanJoint, SourceLine
 from tfcompose.tf.live.sent_joints import SentJoints
 from tfcompose.tf.live.state import MovingJoint, TopicState
@@ -56,16 +56,16 @@ def sender(node: str, *joints: str, first_s: float = 0.0, last_s: float = 10.0) 
     ],
 )
 def test_a_joint_has_one_sender(senders: list[SentJoints], names: list[str]) -> None:
-    found = list(sent_twice(senders))
-    assert [one.code for one in found] == ["TF860"] * bool(names)
-    assert all(name in one.message for one in found for name in names)
-    assert all("elbow" not in one.message for one in found)
+    findings = list(find_sent_twice(senders))
+    assert [one.code for one in findings] == ["TF860"] * bool(names)
+    assert all(name in one.message for one in findings for name in names)
+    assert all("elbow" not in one.message for one in findings)
 
 
 def test_a_joint_that_the_robot_lacks_is_named_with_the_nearest() -> None:
-    (found,) = unknown_joints([sender("/rogue", "arm_jiont", "arm_joint")], {"arm_joint"})
-    assert (found.code, "/rogue" in found.message) == ("TF861", True)
-    assert "arm_joint" in found.help
+    (finding,) = unknown_joints([sender("/rogue", "arm_jiont", "arm_joint")], {"arm_joint"})
+    assert (finding.code, "/rogue" in finding.message) == ("TF861", True)
+    assert "arm_joint" in finding.help
     assert not list(unknown_joints([sender("/rogue", "anything")], set()))
 
 

@@ -208,7 +208,7 @@ def test_a_fixed_frame_of_another_owner_is_where_the_robot_declares_it(
     parent, child = names.split()
     declared = next(edge.pose for edge in PLAN.edges if edge.child == child)
     guard.hears((parent, child, moved(declared, metres)))
-    found = guard.says()
-    assert [one.code for one in found] == codes
-    for one in found:
+    findings = guard.says()
+    assert [one.code for one in findings] == codes
+    for one in findings:
         expect(one, "TF846", "arm in base", "/arm", "1 m")

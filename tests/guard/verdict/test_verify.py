@@ -131,7 +131,7 @@ class Tree:
             )
         self.observer.observed_ns = 110 * S
         verdicts = verify(plan, {TOPICS: self.observer}, TOLERANCE)
-        return [found for verdict in verdicts for found in verdict.found]
+        return [finding for verdict in verdicts for finding in verdict.findings]
 
 
 @pytest.fixture
@@ -158,9 +158,9 @@ def test_an_edge_that_no_lookup_gets_by_its_stamps_is_not_as_expected(
     sent: dict[str, Any], code: str, severity: str, plan: Plan, tree: Tree
 ) -> None:
     tree.sent["base"] |= sent
-    (found,) = tree.reported(plan)
-    assert (found.code, found.severity) == (code, severity)
-    assert DRIVE in found.message
+    (finding,) = tree.reported(plan)
+    assert (finding.code, finding.severity) == (code, severity)
+    assert DRIVE in finding.message
 
 
 def test_the_stamps_of_simulated_time_are_not_judged(plan: Plan, tree: Tree) -> None:
@@ -262,8 +262,8 @@ def test_what_differs_from_the_plan_is_one_finding_with_its_code_and_names(
     tree.sent[child] = tree.sent[child] | (sent or {})
     if sent is None:
         del tree.sent[child]
-    [found] = tree.reported(plan)
-    expect(found, code, *names)
+    [finding] = tree.reported(plan)
+    expect(finding, code, *names)
 
 
 def test_an_edge_with_a_slip_in_its_name_is_missing_and_named(plan: Plan, tree: Tree) -> None:
@@ -317,16 +317,16 @@ def test_another_owners_fixed_edge_without_a_pose_may_be_anywhere(plan: Plan, tr
 def test_another_publisher_is_reported_with_both_names(plan: Plan, tree: Tree) -> None:
     tree.send("base", "odom", "/ekf", rate=10.0)
     tree.observer.take_graph([Publisher(b"/ekf", "/ekf", static=False)])
-    [found] = tree.reported(plan)
-    expect(found, "TF801", "odom → base", "/ekf", "drive (/rover/drive)")
+    [finding] = tree.reported(plan)
+    expect(finding, "TF801", "odom → base", "/ekf", "drive (/rover/drive)")
 
 
 def test_how_far_another_publishers_pose_is_off_is_reported_with_who_it_is(
     plan: Plan, tree: Tree
 ) -> None:
     tree.send("laser", "base", OTHER, Pose((0.25, 0.0, 0.3)))
-    [found] = tree.reported(plan)
-    expect(found, "TF801", "laser", "base", OTHER, "250 mm")
+    [finding] = tree.reported(plan)
+    expect(finding, "TF801", "laser", "base", OTHER, "250 mm")
 
 
 @pytest.mark.parametrize(
@@ -345,12 +345,12 @@ def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -
         for words in tree.sent.values()
     ]
     tree.observer.take_graph([*known, Publisher(b"twin", DRIVE, static=False)])
-    [found] = [
+    [finding] = [
         one
         for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE)
-        for one in verdict.found
+        for one in verdict.findings
     ]
-    expect(found, "TF801", "odom → base", f"another {DRIVE}", f"drive ({DRIVE})")
+    expect(finding, "TF801", "odom → base", f"another {DRIVE}", f"drive ({DRIVE})")
 
 
 def test_of_three_nodes_of_the_owners_name_two_are_named_with_one_edge(
@@ -373,9 +373,9 @@ def test_of_three_nodes_of_the_owners_name_two_are_named_with_one_edge(
     state = state_of(tree.observer, TOPICS)
     twice = [each for each in differences(state, plan) if each.code == "TF801"]
     [group] = group_differences(twice)
-    found = group_finding(group, state, plan)
-    expect(found, "TF801", f"odom → base is published by another {DRIVE} (2 processes)")
-    pids = [note.message.partition(f"{where} ")[2] for note in found.notes]
+    finding = group_finding(group, state, plan)
+    expect(finding, "TF801", f"odom → base is published by another {DRIVE} (2 processes)")
+    pids = [note.message.partition(f"{where} ")[2] for note in finding.notes]
     assert sorted(filter(None, pids)) == ["10", "11", "12"]
 
 
@@ -385,12 +385,12 @@ def test_a_publisher_that_has_left_is_reported(plan: Plan, tree: Tree) -> None:
     present = [words["node"] for child, words in tree.sent.items() if child != "laser"]
     tree.observer.take_graph([Publisher(STATIC.encode(), STATIC, static=True)])
     tree.observer.take_graph([Publisher(node.encode(), node, static=False) for node in present])
-    [found] = [
+    [finding] = [
         one
         for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE)
-        for one in verdict.found
+        for one in verdict.findings
     ]
-    expect(found, "TF804", "static (/rover/static)", "base → laser")
+    expect(finding, "TF804", "static (/rover/static)", "base → laser")
 
 
 def test_an_owner_that_was_started_again_has_not_left(plan: Plan, tree: Tree) -> None:
@@ -413,8 +413,8 @@ def test_where_a_simulation_goes_slower_than_the_time_of_day_edges_may_come_as_m
     assert tree.reported(replace(plan, ros=RosSettings(clock="sim"))) == []
     rarely = Tree()
     rarely.sent["base"] |= {"rate": 5.0}
-    found = rarely.reported(replace(plan, ros=RosSettings(clock="sim")))
-    assert [one.code for one in found] == ["TF805"]
+    findings = rarely.reported(replace(plan, ros=RosSettings(clock="sim")))
+    assert [one.code for one in findings] == ["TF805"]
 
 
 def test_a_value_is_compared_also_where_one_before_it_was_refused(plan: Plan, tree: Tree) -> None:
@@ -432,8 +432,8 @@ def test_a_publisher_that_stays_without_a_name_is_blamed_and_one_that_has_just_c
     plan: Plan, tree: Tree
 ) -> None:
     tree.send("laser", "base", "", LASER, gid=b"raw")
-    [found] = tree.reported(plan)
-    expect(found, "TF801", "base → laser", NAMELESS, "static (/rover/static)")
+    [finding] = tree.reported(plan)
+    expect(finding, "TF801", "base → laser", NAMELESS, "static (/rover/static)")
     fresh = Tree()
     row = ("base", "laser", 109, 0, *LASER.xyz, *LASER.quat_xyzw)
     fresh.observer.take([row], static=True, gid=b"raw", received_ns=110 * S - S // 2)
@@ -456,7 +456,7 @@ def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan:
         [*publishers, *(replace(one, static=True, gid=one.gid + b"s") for one in publishers)]
     )
     verdicts = verify(plan, {TOPICS: tree.observer}, TOLERANCE)
-    assert [found.code for verdict in verdicts for found in verdict.found] == []
+    assert [finding.code for verdict in verdicts for finding in verdict.findings] == []
 
 
 def test_a_driver_far_from_its_preset_is_reported_and_strangers_are_not_compared(
@@ -470,8 +470,8 @@ def test_a_driver_far_from_its_preset_is_reported_and_strangers_are_not_compared
     assert tree.reported(plan) == [], "calibrated"
     tree = Tree()
     tree.sent["lens"]["pose"] = Pose((0.0, 0.06, 0.0))
-    [found] = tree.reported(plan)
-    expect(found, "TF828", "lens", "camera", CAMERA, "45 mm", "realsense/d435i")
+    [finding] = tree.reported(plan)
+    expect(finding, "TF828", "lens", "camera", CAMERA, "45 mm", "realsense/d435i")
     tree = Tree()
     tree.send("lens", "camera", OTHER, Pose((0.0, 0.06, 0.0)))
     assert [one.code for one in tree.reported(plan)] == ["TF801"]

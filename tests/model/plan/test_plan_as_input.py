@@ -70,9 +70,9 @@ def test_what_no_build_writes_is_refused() -> None:
     for name, change in WRONG.items():
         with pytest.raises(RejectedError) as rejected:
             read_plan(plan_with(change), "plan.json")
-        found = rejected.value.findings
-        assert {one.code for one in found} == {"TF902"}, name
-        assert all(one.message.isprintable() for one in found), name
+        findings = rejected.value.findings
+        assert {one.code for one in findings} == {"TF902"}, name
+        assert all(one.message.isprintable() for one in findings), name
 
 
 def test_all_that_is_wrong_is_found_at_once() -> None:

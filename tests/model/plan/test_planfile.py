@@ -61,9 +61,9 @@ def refused(text: str) -> str:
     """Return the message of the one finding for a text that is no plan."""
     with pytest.raises(RejectedError) as rejected:
         read_plan(text, "plan.json")
-    (found,) = rejected.value.findings
-    assert (found.code, found.span and found.span.file) == ("TF902", "plan.json")
-    return found.message.removeprefix("not a valid plan: ")
+    (finding,) = rejected.value.findings
+    assert (finding.code, finding.span and finding.span.file) == ("TF902", "plan.json")
+    return finding.message.removeprefix("not a valid plan: ")
 
 
 def test_what_is_encoded_is_decoded() -> None:
@@ -113,8 +113,8 @@ WRONG: tuple[tuple[tuple[str | int, ...], Any], ...] = (
 def test_what_is_wrong_is_refused_with_the_path_to_it() -> None:
     for path, value in WRONG:
         at = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
-        found = re.search(r" - at `\$(.*)`$", refused(changed(path, value)))
-        named = found[1] if found else ""
+        match = re.search(r" - at `\$(.*)`$", refused(changed(path, value)))
+        named = match[1] if match else ""
         # A key of a mapping of names is not named; a key that is missing, and a rule about
         # several, name what holds them.
         place = re.escape(named).replace(r"\[\.\.\.\]", r"\.[^.]+")
@@ -131,10 +131,10 @@ def test_what_is_no_number_of_json_is_refused_at_its_place(number: str) -> None:
     text = changed(("edges", 1, "rate"), 12345.5).replace("12345.5", number)
     with pytest.raises(RejectedError) as rejected:
         read_plan(text, "plan.json")
-    (found,) = rejected.value.findings
-    assert found.span
-    assert found.code == "TF902"
-    assert number == "1e999" or text[: found.span.column - 1].endswith('"rate": ')
+    (finding,) = rejected.value.findings
+    assert finding.span
+    assert finding.code == "TF902"
+    assert number == "1e999" or text[: finding.span.column - 1].endswith('"rate": ')
 
 
 def test_keys_of_a_later_version_are_ignored() -> None:

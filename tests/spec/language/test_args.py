@@ -49,7 +49,7 @@ def robot(compiled: Compiled) -> Robot:
 
 
 def places(compiled: Compiled) -> list[tuple[str, str, int]]:
-    return [(one.code, one.span.file, one.span.line) for one in compiled.found if one.span]
+    return [(one.code, one.span.file, one.span.line) for one in compiled.findings if one.span]
 
 
 CAMERAS = """\
@@ -92,13 +92,13 @@ def test_a_wrong_value_is_a_finding_that_names_what_can_be(
 ) -> None:
     name = text.partition(":")[0]
     uses = "vars: {x: '${args.NAME}'}\nprocesses: {p: {run: [x, '${x}']}}\n".replace("NAME", name)
-    (found,) = built(f"args: {{{text}}}\n{uses}", given).errors
-    assert found.code == code
-    assert names in found.message + found.help
-    assert found.span
+    (finding,) = built(f"args: {{{text}}}\n{uses}", given).errors
+    assert finding.code == code
+    assert names in finding.message + finding.help
+    assert finding.span
     assert (
-        found.span.file == "".join(f"{one}:={value}" for one, value in given.items())
-        or found.span.file == "r.yaml"
+        finding.span.file == "".join(f"{one}:={value}" for one, value in given.items())
+        or finding.span.file == "r.yaml"
     )
 
 
@@ -251,7 +251,7 @@ processes: {p: {run: [x, "dev_${env(PORT)}"]}}
 
 
 def test_an_argument_that_nothing_uses_is_named() -> None:
-    assert [one.code for one in built("args: {n: 1}\n").found] == ["TF504"]
+    assert [one.code for one in built("args: {n: 1}\n").findings] == ["TF504"]
 
 
 @pytest.mark.parametrize(
@@ -264,9 +264,9 @@ def test_an_argument_that_nothing_uses_is_named() -> None:
 def test_a_loop_over_no_list_names_what_is_unknown_in_it_or_its_range(
     wrong: str, message: str, advice: str
 ) -> None:
-    (found,) = built(CAMERAS.replace("range(args.cameras)", wrong)).errors
-    assert message in found.message
-    assert advice in found.help
+    (finding,) = built(CAMERAS.replace("range(args.cameras)", wrong)).errors
+    assert message in finding.message
+    assert advice in finding.help
 
 
 def test_entries_of_a_loop_choose_their_values() -> None:
@@ -303,7 +303,7 @@ def test_what_a_profile_replaced_in_an_entry_that_a_loop_makes_is_noted() -> Non
         "frames: {'f_${i}': {for: {i: [1]}, parent: base_link, xyz: [1, 0, 0]}}\n"
         "profiles: {high: {frames: {'f_${i}': {xyz: [900, 0, 0]}}}}\n"
     )
-    (far,) = [one for one in built(text, profiles=("high",)).found if one.code == "TF414"]
+    (far,) = [one for one in built(text, profiles=("high",)).findings if one.code == "TF414"]
     assert far.span
     assert (far.span.line, [note.span.line for note in far.notes if note.span]) == (5, [4])
 

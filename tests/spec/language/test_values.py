@@ -33,12 +33,12 @@ def value_of(source_text: str, variables: str = "{}") -> Any:
     done = validated(
         f"vars: {variables}\nframes: {{a: {{parent: b, xyz: [{source_text}, 0, 0]}}}}\n"
     )
-    assert not done.found, done.found
+    assert not done.findings, done.findings
     return done.spec.frames["a"].xyz[0]
 
 
 def codes_of(text: str) -> list[str]:
-    return [one.code for one in validated(text).found]
+    return [one.code for one in validated(text).findings]
 
 
 EXACT = {
@@ -93,8 +93,8 @@ def test_an_unknown_unit_is_named_with_the_one_that_is_meant(unit: str, advice: 
     ],
 )
 def test_the_unit_that_is_advised_has_the_dimension_that_is_wanted(unit: str, advice: str) -> None:
-    (found,) = validated(f"frames: {{a: {{parent: b, xyz: [1 {unit}, 0, 0]}}}}\n").found
-    assert found.help.startswith(advice)
+    (finding,) = validated(f"frames: {{a: {{parent: b, xyz: [1 {unit}, 0, 0]}}}}\n").findings
+    assert finding.help.startswith(advice)
 
 
 EXPRESSIONS = {
@@ -261,10 +261,10 @@ def test_a_chain_of_a_thousand_variables_is_computed() -> None:
 
 
 def test_variables_that_need_each_other_are_one_finding_that_shows_the_circle() -> None:
-    found = validated(
+    findings = validated(
         'vars: {a: "${b}", b: "${c}", c: "${a}"}\nframes: {f: {parent: b, xyz: ["${a}", 0, 0]}}\n'
-    ).found
-    (one,) = found
+    ).findings
+    (one,) = findings
     assert one.code == "TF105"
     assert "a → b → c → a" in one.message
 
@@ -319,7 +319,7 @@ ROTATIONS = {
 @pytest.mark.parametrize("source_text", ROTATIONS)
 def test_each_way_to_write_a_rotation_agrees_with_scipy(source_text: str) -> None:
     done = validated(f"frames: {{a: {{parent: b, {source_text}}}}}\n")
-    assert not done.found
+    assert not done.findings
     found = done.spec.frames["a"].rotation
     assert found
     x, y, z, w = ROTATIONS[source_text].as_quat()
@@ -394,13 +394,13 @@ def test_a_joint_limit_takes_the_units_of_its_motion(
     validated = validate(compose(load(text, "f")))
     output = validated.spec.joints["j"].limit
     assert output
-    assert not validated.found
+    assert not validated.findings
     assert (output.velocity, output.effort) == pytest.approx((velocity, effort))
 
 
 @pytest.mark.parametrize("name", ["pi", "a b", "ü", "1a", "build_dir", "params_file", ""])
 def test_a_variable_that_no_expression_can_mean_is_refused_where_it_stands(name: str) -> None:
-    (one,) = validated(f"vars: {{{name!r}: 3}}\nframes: {{f: {{}}}}\n").found
+    (one,) = validated(f"vars: {{{name!r}: 3}}\nframes: {{f: {{}}}}\n").findings
     assert one.code == "TF105"
     assert (one.span and one.span.line) == 3
 
@@ -410,7 +410,7 @@ def test_a_variable_that_no_expression_can_mean_is_refused_where_it_stands(name:
     "where", ["vars: {a: %s}", "frames: {f: {parent: %s}}", "base: %s", "calibrations: [%s]"]
 )
 def test_what_only_processes_can_use_is_refused_elsewhere(what: str, where: str) -> None:
-    (one,) = validated(where % f"'${{{what}}}'" + "\n").found
+    (one,) = validated(where % f"'${{{what}}}'" + "\n").findings
     assert one.code == "TF105"
     assert one.message.endswith("is for processes only")
     assert "run, params" in one.help
@@ -418,8 +418,8 @@ def test_what_only_processes_can_use_is_refused_elsewhere(what: str, where: str)
 
 @pytest.mark.parametrize("what", ["frame(f) + 1", "2 * file(a/b.yaml)", "frame(${a})"])
 def test_in_a_process_they_stand_alone(what: str) -> None:
-    found = validated(f"processes: {{p: {{run: [x, '${{{what}}}']}}}}\n").found
-    assert {one.code for one in found} == {"TF105"}
+    findings = validated(f"processes: {{p: {{run: [x, '${{{what}}}']}}}}\n").findings
+    assert {one.code for one in findings} == {"TF105"}
 
 
 def test_a_computed_number_is_a_word_of_a_command_and_of_its_environment() -> None:

@@ -26,7 +26,7 @@ def test_a_file_is_laid_over_what_it_includes() -> None:
     source = included(files)
     assert source.data == {"robot": "mine", "links": {"a": {}, "b": {"x": 3, "y": 2}}}
     assert source.file == "robot.yaml"
-    assert not source.found
+    assert not source.findings
 
 
 def test_each_value_knows_its_file_and_what_it_replaced() -> None:
@@ -35,7 +35,10 @@ def test_each_value_knows_its_file_and_what_it_replaced() -> None:
         "base.yaml": "links: {b: {x: 1, y: 2}}\n",
     }
     source = included(files)
-    assert (source.at(("links", "b", "x")).file, source.at(("links", "b", "y")).file) == (
+    assert (
+        source.span_of(("links", "b", "x")).file,
+        source.span_of(("links", "b", "y")).file,
+    ) == (
         "robot.yaml",
         "base.yaml",
     )
@@ -77,15 +80,17 @@ def test_null_in_a_profile_is_kept_for_the_profile() -> None:
 
 
 def test_files_that_include_each_other_are_refused_with_the_circle() -> None:
-    (found,) = refused({"robot.yaml": "include: [a.yaml]\n", "a.yaml": "include: [robot.yaml]\n"})
-    assert (found.code, found.span and found.span.file) == ("TF015", "a.yaml")
-    assert "robot.yaml → a.yaml → robot.yaml" in found.message
+    (finding,) = refused(
+        {"robot.yaml": "include: [a.yaml]\n", "a.yaml": "include: [robot.yaml]\n"}
+    )
+    assert (finding.code, finding.span and finding.span.file) == ("TF015", "a.yaml")
+    assert "robot.yaml → a.yaml → robot.yaml" in finding.message
 
 
 def test_a_file_that_is_not_there_is_reported_with_the_place_that_includes_it() -> None:
-    (found,) = refused({"robot.yaml": "robot: r\ninclude:\n  - nope.yaml\n"})
-    assert found.code == "TF001"
-    assert [(note.message, str(note.span)) for note in found.notes] == [
+    (finding,) = refused({"robot.yaml": "robot: r\ninclude:\n  - nope.yaml\n"})
+    assert finding.code == "TF001"
+    assert [(note.message, str(note.span)) for note in finding.notes] == [
         ("included here", "robot.yaml:3:5")
     ]
 
@@ -93,8 +98,8 @@ def test_a_file_that_is_not_there_is_reported_with_the_place_that_includes_it() 
 @pytest.mark.parametrize("source_text", ["3", "[a.yaml, 3]", "{a: b}", "['']"])
 def test_include_takes_names_of_files(source_text: str) -> None:
     assert [
-        found.code
-        for found in refused({"robot.yaml": f"include: {source_text}\n", "a.yaml": "robot: r"})
+        finding.code
+        for finding in refused({"robot.yaml": f"include: {source_text}\n", "a.yaml": "robot: r"})
     ] == ["TF103"]
 
 
@@ -102,7 +107,7 @@ def test_many_files_are_bounded() -> None:
     files = {"robot.yaml": "include: [a0.yaml, a0.yaml]\n"}
     files |= {f"a{n}.yaml": f"include: [a{n + 1}.yaml, a{n + 1}.yaml]\n" for n in range(30)}
     files["a30.yaml"] = "robot: r\n"
-    assert [found.code for found in refused(files)] == ["TF015"]
+    assert [finding.code for finding in refused(files)] == ["TF015"]
 
 
 def test_overlays_come_after_profiles_and_settings_last() -> None:
@@ -114,13 +119,13 @@ def test_overlays_come_after_profiles_and_settings_last() -> None:
 def test_an_overlay_can_bring_a_profile() -> None:
     source = load("a: 0\n", "f")
     made = compose(source, ["p"], [load("profiles: {p: {a: 1}}\n", "o")])
-    assert (made.data, made.found) == ({"a": 1}, ())
+    assert (made.data, made.findings) == ({"a": 1}, ())
 
 
 def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
-    found = compose(load("a: {x: 1}\n", "f"), [], [load("a: {x: 1}\n", "o")]).found
+    findings = compose(load("a: {x: 1}\n", "f"), [], [load("a: {x: 1}\n", "o")]).findings
     assert [
-        (one.code, str(one.span), [str(note.span) for note in one.notes]) for one in found
+        (one.code, str(one.span), [str(note.span) for note in one.notes]) for one in findings
     ] == [("TF014", "o:1:8", ["f:1:8"])]
 
 
@@ -136,21 +141,21 @@ def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
 def test_an_overlay_that_is_empty_where_something_stands_is_a_finding(
     overlay: str, place: str
 ) -> None:
-    (one,) = compose(load("a: {x: 1, b: {y: 2}}\n", "f"), [], [load(overlay, "o")]).found
+    (one,) = compose(load("a: {x: 1, b: {y: 2}}\n", "f"), [], [load(overlay, "o")]).findings
     assert (one.code, str(one.span)) == ("TF014", place)
 
 
 def test_an_overlay_may_say_which_language_it_is_in_and_bring_what_is_new_and_empty() -> None:
     assert not compose(
         load("tfcompose: 1\na: {}\n", "f"), [], [load("tfcompose: 1\na: {b: {}}\n", "o")]
-    ).found
+    ).findings
 
 
 def test_an_included_file_may_be_completed_by_what_stands_there_already() -> None:
     files = {"base": "links: {a: {}, b: {}}\n"}
     assert not with_includes(
         load("include: [base]\nlinks: {a: {}}\n", "f"), files.__getitem__
-    ).found
+    ).findings
 
 
 def test_a_setting_cannot_include() -> None:
@@ -160,7 +165,7 @@ def test_a_setting_cannot_include() -> None:
 
 
 def test_true_is_not_one() -> None:
-    assert not compose(load("a: 1\n", "f"), [], [load("a: true\n", "o")]).found
+    assert not compose(load("a: 1\n", "f"), [], [load("a: true\n", "o")]).findings
 
 
 @pytest.mark.parametrize(
@@ -182,9 +187,9 @@ def test_a_setting_is_a_path_and_a_yaml_value(setting: str, data: dict[str, obje
 def test_what_is_no_setting_is_refused(setting: str) -> None:
     with pytest.raises(RejectedError) as rejected:
         set_value(setting)
-    assert [found.code for found in rejected.value.findings] == ["TF016"]
+    assert [finding.code for finding in rejected.value.findings] == ["TF016"]
 
 
 def test_a_fault_in_a_setting_is_placed_at_the_setting() -> None:
     source = compose(load("links: {}\n", "f"), [], [set_value("links.a.x=3")])
-    assert source.at(("links", "a", "x")).file == "--set links.a.x=3"
+    assert source.span_of(("links", "a", "x")).file == "--set links.a.x=3"

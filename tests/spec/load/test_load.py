@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tfcompose.foundation.findings import RejectedError, Span
 from tfcompose.spec.language import compose, validate
 from tfcompose.spec.load import Source, load
-from tfcompose.spec.load.nodes import MOST_VALUES, Place
+from tfcompose.spec.load.nodes import MOST_VALUES, Location
 
 # YAML 1.2.2, section 10.3.2 (core schema). YAML 1.1 reads several of these otherwise.
 SCALARS: dict[str, Any] = {
@@ -80,12 +80,12 @@ def test_every_integer_reads_back_as_itself(value: int) -> None:
     "number", [".nan", ".inf", "-.INF", "1e999", "9" * 400, "0x" + "f" * 400, "0o" + "7" * 400]
 )
 def test_what_is_not_finite_is_a_finding_at_its_place(number: str) -> None:
-    found = load(f"a: {number}\n", "f").found
-    assert [(one.code, one.span) for one in found] == [
+    findings = load(f"a: {number}\n", "f").findings
+    assert [(one.code, one.span) for one in findings] == [
         ("TF007", Span("f", 1, 4, 1, 4 + len(number)))
     ]
-    assert number[:40] in found[0].message
-    assert len(found[0].message) < 100
+    assert number[:40] in findings[0].message
+    assert len(findings[0].message) < 100
 
 
 @pytest.mark.parametrize(
@@ -100,10 +100,10 @@ def test_what_is_not_finite_is_a_finding_at_its_place(number: str) -> None:
 def test_parameters_of_nodes_may_be_infinite(around: str) -> None:
     for number, value in ((".inf", math.inf), ("-.INF", -math.inf), ("+.Inf", math.inf)):
         source = load(around.replace("NUMBER", number), "f")
-        assert not source.found
+        assert not source.findings
         assert repr(value) in repr(source.data)
     assert "nan" in repr(load(around.replace("NUMBER", ".nan"), "f").data)
-    assert [one.code for one in load(around.replace("NUMBER", "1e999"), "f").found] == ["TF007"]
+    assert [one.code for one in load(around.replace("NUMBER", "1e999"), "f").findings] == ["TF007"]
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_parameters_of_nodes_may_be_infinite(around: str) -> None:
     ],
 )
 def test_what_is_named_params_elsewhere_may_not_be_infinite(around: str) -> None:
-    assert [one.code for one in load(around, "f").found] == ["TF007"]
+    assert [one.code for one in load(around, "f").findings] == ["TF007"]
 
 
 TEXT = """\
@@ -132,19 +132,21 @@ links:
 
 def test_keys_and_values_know_where_they_stand() -> None:
     source = load(TEXT, "f")
-    assert source.at(("robot",)) == Span("f", 1, 8, 1, 9)
-    assert source.at_key(("robot",)) == Span("f", 1, 1, 1, 6)
-    assert source.at_key(("links", "base_link")) == Span("f", 3, 3, 3, 12)
-    assert source.at(("links", "base_link")) == Span("f", 3, 14, 3, 34)
-    assert source.at(("links", "base_link", "visual", 1)) == Span("f", 3, 27, 3, 32)
-    assert source.at_key(("käse",)) == Span("f", 4, 1, 4, 7)
+    assert source.span_of(("robot",)) == Span("f", 1, 8, 1, 9)
+    assert source.key_span(("robot",)) == Span("f", 1, 1, 1, 6)
+    assert source.key_span(("links", "base_link")) == Span("f", 3, 3, 3, 12)
+    assert source.span_of(("links", "base_link")) == Span("f", 3, 14, 3, 34)
+    assert source.span_of(("links", "base_link", "visual", 1)) == Span("f", 3, 27, 3, 32)
+    assert source.key_span(("käse",)) == Span("f", 4, 1, 4, 7)
 
 
 def test_what_is_not_there_has_the_place_of_what_is_around_it() -> None:
     source = load(TEXT, "f")
-    assert source.at(("links", "base_link", "mass", "kg")) == source.at(("links", "base_link"))
-    assert source.at_key(("links", "arm")) == source.at_key(("links",))
-    assert Source("f", Place(Span("f")), {}).at(("a",)) == Span("f")
+    assert source.span_of(("links", "base_link", "mass", "kg")) == source.span_of(
+        ("links", "base_link")
+    )
+    assert source.key_span(("links", "arm")) == source.key_span(("links",))
+    assert Source("f", Location(Span("f")), {}).span_of(("a",)) == Span("f")
 
 
 def test_the_first_of_two_equal_keys_counts_and_the_second_is_a_finding_that_shows_the_first() -> (
@@ -152,8 +154,8 @@ def test_the_first_of_two_equal_keys_counts_and_the_second_is_a_finding_that_sho
 ):
     source = load("a: 1\nb: 2\na: 3\n", "f")
     assert source.data == {"a": 1, "b": 2}
-    (found,) = source.found
-    assert (found.code, found.span, found.notes[0].span) == (
+    (finding,) = source.findings
+    assert (finding.code, finding.span, finding.notes[0].span) == (
         "TF003",
         Span("f", 3, 1, 3, 2),
         Span("f", 1, 1, 1, 2),
@@ -172,15 +174,15 @@ quoted: {"<<": 1}
 
 def test_merges_give_what_is_missing_and_the_first_wins() -> None:
     source = load(MERGED, "f")
-    assert not source.found
+    assert not source.findings
     assert source.data == {
         "own": {"a": 1, "b": 0},
         "first": {"a": 1, "b": 1, "c": 2},
         "deep": {"a": 3, "b": 2, "c": 2, "d": 3},
         "quoted": {"<<": 1},
     }
-    assert source.at(("own", "a")).line == 1
-    assert source.at(("own", "b")).line == 3
+    assert source.span_of(("own", "a")).line == 1
+    assert source.span_of(("own", "b")).line == 3
 
 
 @pytest.mark.parametrize(
@@ -202,7 +204,7 @@ def test_merges_give_what_is_missing_and_the_first_wins() -> None:
     ],
 )
 def test_what_yaml_allows_and_a_robot_does_not_is_one_finding(text: str, code: str) -> None:
-    assert {one.code for one in load(text, "f").found} == {code}
+    assert {one.code for one in load(text, "f").findings} == {code}
 
 
 @pytest.mark.parametrize(
@@ -231,8 +233,8 @@ def test_what_is_no_yaml_is_one_finding_with_its_place(
 ) -> None:
     with pytest.raises(RejectedError) as rejected:
         load(text, "f")
-    (found,) = rejected.value.findings
-    assert (found.code, found.span and (found.span.line, found.span.column)) == (
+    (finding,) = rejected.value.findings
+    assert (finding.code, finding.span and (finding.span.line, finding.span.column)) == (
         code,
         (line, column),
     )
@@ -260,10 +262,10 @@ def test_a_file_for_another_command_is_one_finding_that_says_which(
 ) -> None:
     with pytest.raises(RejectedError) as rejected:
         load(text, "f")
-    (found,) = rejected.value.findings
-    assert found.message.startswith(message)
-    assert advice in found.help
-    assert bool(found.help) == bool(advice)
+    (finding,) = rejected.value.findings
+    assert finding.message.startswith(message)
+    assert advice in finding.help
+    assert bool(finding.help) == bool(advice)
 
 
 def bomb(kind: str) -> str:
@@ -333,9 +335,9 @@ def test_text_that_is_nested_too_deep_is_refused_at_the_first_level_too_many(
     with pytest.raises(RejectedError) as rejected:
         load(text, "f")
     places = [
-        (found.code, found.span.line, found.span.column)
-        for found in rejected.value.findings
-        if found.span
+        (finding.code, finding.span.line, finding.span.column)
+        for finding in rejected.value.findings
+        if finding.span
     ]
     assert places == [expected], case
 
@@ -372,15 +374,15 @@ def test_mappings_merge_and_scalars_and_lists_replace() -> None:
 def test_null_removes_and_says_so_where_nothing_was() -> None:
     removed = laid(BASE, "remove")
     assert removed.data["a"] == {"b": 1, "c": [1, 2]}
-    assert not removed.found
+    assert not removed.findings
     for profile, name, line in (("nothing", "a.x", 8), ("within", "new.y.z", 9)):
-        (found,) = laid(BASE, profile).found
-        assert (found.code, found.severity, found.span and found.span.line) == (
+        (finding,) = laid(BASE, profile).findings
+        assert (finding.code, finding.severity, finding.span and finding.span.line) == (
             "TF010",
             "warning",
             line,
         )
-        assert name in found.message
+        assert name in finding.message
 
 
 def test_one_choice_out_of_several_drops_the_others() -> None:
@@ -393,14 +395,14 @@ def test_one_choice_out_of_several_drops_the_others() -> None:
 
 def test_a_key_remembers_where_it_is_from() -> None:
     merged = laid(BASE, "merge", "list")
-    assert merged.at(("a", "b")).line == 5
-    assert merged.at(("a", "c", 0)).line == 6
-    assert merged.at(("a", "d", "e")).line == 1
+    assert merged.span_of(("a", "b")).line == 5
+    assert merged.span_of(("a", "c", 0)).line == 6
+    assert merged.span_of(("a", "d", "e")).line == 1
     assert not merged.has(("a", "c", 1))
 
 
 def spans_of(source: Source) -> dict[Any, Span]:
-    return {path: place.span for path, place in source.places.walk()}
+    return {path: location.span for path, location in source.places.walk()}
 
 
 def test_laying_a_profile_over_leaves_the_source_as_it_was() -> None:
@@ -411,25 +413,25 @@ def test_laying_a_profile_over_leaves_the_source_as_it_was() -> None:
 
 
 def test_a_null_that_removes_nothing_is_a_finding_at_its_place_also_in_a_list() -> None:
-    found = validate(
+    findings = validate(
         laid("tfcompose: 1\nrobot: r\nbase:\nvars: {c: ~}\ninclude: [a, null]\n")
-    ).found
-    assert [(one.code, one.span and one.span.line) for one in found] == [
+    ).findings
+    assert [(one.code, one.span and one.span.line) for one in findings] == [
         ("TF006", n) for n in (3, 4, 5)
     ]
 
 
 @pytest.mark.parametrize("profiles", ["5", "[a]", "{a: 5}", "{a: {profiles: {b: {}}}}"])
 def test_profiles_of_a_wrong_form_are_found_without_choosing_one(profiles: str) -> None:
-    assert {one.code for one in laid(f"profiles: {profiles}\n").found} <= {"TF103", "TF101"}
-    assert laid(f"profiles: {profiles}\n").found
+    assert {one.code for one in laid(f"profiles: {profiles}\n").findings} <= {"TF103", "TF101"}
+    assert laid(f"profiles: {profiles}\n").findings
 
 
 def test_an_unknown_profile_is_refused_once_with_the_nearest_name() -> None:
     with pytest.raises(RejectedError) as rejected:
         laid(BASE, "merg", "merg")
-    (found,) = rejected.value.findings
-    assert (found.code, found.help) == ("TF009", "did you mean merge?")
+    (finding,) = rejected.value.findings
+    assert (finding.code, finding.help) == ("TF009", "did you mean merge?")
 
 
 def test_a_large_profile_is_laid_over_in_time_that_grows_with_its_size() -> None:
@@ -458,16 +460,16 @@ two: {<<: *used, 3: {a: !mine b}}
 
 
 def test_faults_below_an_anchor_are_reported_once_and_only_if_it_is_used() -> None:
-    found = load(ASIDE, "f").found
-    places = sorted((one.code, one.span.line, one.span.column) for one in found if one.span)
+    findings = load(ASIDE, "f").findings
+    places = sorted((one.code, one.span.line, one.span.column) for one in findings if one.span)
     assert places == [("TF004", 2, 28), ("TF004", 4, 18), ("TF005", 2, 19), ("TF007", 2, 38)]
 
 
 def test_an_alias_is_the_value_of_its_anchor_with_its_place_and_a_key_of_its_own() -> None:
     source = load("x-a: &a {k: [1]}\none: *a\ntwo: {b: *a}\n", "f")
     assert source.data["one"] is source.data["two"]["b"]
-    assert source.at(("two", "b", "k", 0)) == Span("f", 1, 14, 1, 15)
-    assert source.at_key(("two", "b")) == Span("f", 3, 7, 3, 8)
+    assert source.span_of(("two", "b", "k", 0)) == Span("f", 1, 14, 1, 15)
+    assert source.key_span(("two", "b")) == Span("f", 3, 7, 3, 8)
     assert source.has_key(("two", "b", "k"))
     assert not source.has_key(("two", "b", "k", 0))
     assert not source.has_key(())

@@ -40,7 +40,7 @@ def messages(monkeypatch: pytest.MonkeyPatch) -> Messages:
 
 def joints_of(states: JointStates) -> set[str]:
     states.take()
-    return {joint for sent in states.sent() for joint in sent.joints}
+    return {joint for sent in states.sent_joints() for joint in sent.joints}
 
 
 def test_a_publisher_of_ever_new_names_takes_bounded_memory(messages: Messages) -> None:

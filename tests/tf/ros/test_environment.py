@@ -111,14 +111,14 @@ def test_other_middlewares_get_no_profile_of_fast_dds() -> None:
 
 def test_a_middleware_that_is_not_installed_is_named_as_the_robot_file_names_it() -> None:
     ros = RosSettings(rmw="zenoh")
-    found = ros_trouble(child_environment({}, ros, own=True), ros)
-    assert found is not None
-    assert (found.code, "rmw: zenoh" in found.message, "rmw_zenoh_cpp" in found.message) == (
+    finding = ros_trouble(child_environment({}, ros, own=True), ros)
+    assert finding is not None
+    assert (finding.code, "rmw: zenoh" in finding.message, "rmw_zenoh_cpp" in finding.message) == (
         "TF901",
         True,
         True,
     )
-    assert "ros-jazzy-rmw-zenoh-cpp" in found.help
+    assert "ros-jazzy-rmw-zenoh-cpp" in finding.help
 
 
 def test_other_middlewares_need_tf2_msgs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,9 +127,9 @@ def test_other_middlewares_need_tf2_msgs(monkeypatch: pytest.MonkeyPatch) -> Non
         "tfcompose.tf.ros.environment.find_spec", lambda name: None if name == "tf2_msgs" else name
     )
     assert ros_trouble({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}) is None
-    found = ros_trouble({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"})
-    assert found is not None
-    assert (found.code, "tf2_msgs" in found.message) == ("TF901", True)
+    finding = ros_trouble({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"})
+    assert finding is not None
+    assert (finding.code, "tf2_msgs" in finding.message) == ("TF901", True)
 
 
 def test_a_configuration_of_zenoh_that_is_not_there_is_named(
@@ -139,9 +139,9 @@ def test_a_configuration_of_zenoh_that_is_not_there_is_named(
     monkeypatch.setattr("tfcompose.tf.ros.environment.find_spec", lambda name: name)
     file = tmp_path / "session.json5"
     environment = {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ZENOH_SESSION_CONFIG_URI": str(file)}
-    found = ros_trouble(environment)
-    assert found is not None
-    assert (found.code, str(file) in found.message) == ("TF909", True)
+    finding = ros_trouble(environment)
+    assert finding is not None
+    assert (finding.code, str(file) in finding.message) == ("TF909", True)
     assert ros_trouble({**environment, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}) is None
     file.touch()
     assert ros_trouble(environment) is None
@@ -151,19 +151,23 @@ def test_a_configuration_of_zenoh_that_is_not_there_is_named(
     ("here", "warned"), [("rmw_fastrtps_cpp", True), ("rmw_zenoh_cpp", False), ("", False)]
 )
 def test_an_environment_with_another_middleware_is_warned_of(here: str, *, warned: bool) -> None:
-    found = other_middleware({"RMW_IMPLEMENTATION": here}, RosSettings(rmw="zenoh"))
-    assert (found is not None) == warned
-    if found:
-        assert (found.code, found.severity) == ("TF909", "warning")
+    finding = other_middleware({"RMW_IMPLEMENTATION": here}, RosSettings(rmw="zenoh"))
+    assert (finding is not None) == warned
+    if finding:
+        assert (finding.code, finding.severity) == ("TF909", "warning")
     assert other_middleware({"RMW_IMPLEMENTATION": here}, RosSettings()) is None
 
 
 @pytest.mark.parametrize(("here", "warned"), [("jazzy", True), ("kilted", False)])
 def test_another_release_of_ros_than_the_robots_is_warned_of(here: str, *, warned: bool) -> None:
-    found = other_distro({"ROS_DISTRO": here}, RosSettings(distro="kilted"))
-    assert (found is not None) == warned
-    if found:
-        assert (found.code, found.severity, "Jazzy" in found.message) == ("TF909", "warning", True)
+    finding = other_distro({"ROS_DISTRO": here}, RosSettings(distro="kilted"))
+    assert (finding is not None) == warned
+    if finding:
+        assert (finding.code, finding.severity, "Jazzy" in finding.message) == (
+            "TF909",
+            "warning",
+            True,
+        )
     assert other_distro({"ROS_DISTRO": here}, RosSettings()) is None
 
 
@@ -185,6 +189,6 @@ def test_without_a_variable_the_release_is_that_of_rclpy(monkeypatch: pytest.Mon
 
 def test_advice_names_the_packages_of_the_robots_release() -> None:
     ros = RosSettings(rmw="zenoh", distro="kilted")
-    found = ros_trouble(child_environment({}, ros, own=True), ros)
-    assert found is not None
-    assert "ros-kilted-rmw-zenoh-cpp" in found.help
+    finding = ros_trouble(child_environment({}, ros, own=True), ros)
+    assert finding is not None
+    assert "ros-kilted-rmw-zenoh-cpp" in finding.help

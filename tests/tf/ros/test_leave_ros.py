@@ -7,9 +7,9 @@ from tests.support import processes
 STUCK = """
 import ctypes
 from tests.support import processes
-from tfcompose.tf.ros.node import LEAVE_S, ended_unless_done
+from tfcompose.tf.ros.node import LEAVE_S, end_unless_done
 print("in", flush=True)
-with ended_unless_done(LEAVE_S):
+with end_unless_done(LEAVE_S):
     ctypes.PyDLL(None).sleep(120)
 """
 

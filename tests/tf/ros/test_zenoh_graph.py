@@ -230,7 +230,7 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
                         one.data, sent.gid, sent.source_ns, one.received_ns, sent.sequence
                     )
                     message = reader.read(received, static=False)
-                    events += judge.arrived(judge.take(message, now), message, now)
+                    events += judge.judge_arrival(judge.take(message, now), message, now)
             found.extend(
                 event for event in [*events, *judge.tick(now)] if isinstance(event, FindingShown)
             )

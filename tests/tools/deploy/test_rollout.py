@@ -106,8 +106,8 @@ def test_a_host_that_runs_the_release_goes_on() -> None:
 )
 def test_whatever_fails_on_one_host_takes_all_back(request_: str, answer: Any, says: str) -> None:
     main, jetson = StandInHost("main"), StandInHost("jetson", {request_: answer})
-    found = rejected(main, jetson)
-    expect(found[0], "TF917", says, "main returned to release before")
+    findings = rejected(main, jetson)
+    expect(findings[0], "TF917", says, "main returned to release before")
     assert main.requests[-1] == jetson.requests[-1] == "back"
 
 

@@ -213,9 +213,11 @@ def test_only_shared_edges_leave_with_their_names_in_the_fleet_once_in_each_peri
     assert edges.take(message, static=False, now_ns=11 * period_ns - 1) is None
     assert edges.take(message, static=False, now_ns=11 * period_ns) is not None
     assert edges.take(tf(("base_link", "laser")), static=False, now_ns=0) is None
-    assert decode(edges.fixed()) == []
+    assert decode(edges.fixed_message()) == []
     assert edges.take(tf(("map", "odom"), ("map", "dock")), static=True, now_ns=0) is None
-    assert [(one.parent, one.child) for one in decode(edges.fixed())] == [("map", "r1/odom")]
+    assert [(one.parent, one.child) for one in decode(edges.fixed_message())] == [
+        ("map", "r1/odom")
+    ]
 
 
 def test_the_command_lists_robots_prints_poses_and_says_what_is_wrong(

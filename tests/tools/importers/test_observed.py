@@ -13,7 +13,7 @@ from tfcompose.spec.load import load
 from tfcompose.tf.live.publishers import Publisher
 from tfcompose.tf.live.state import NO_NODE
 from tfcompose.tools.importers.draft import ImportDraft
-from tfcompose.tools.importers.observed import Observed, round_rate, started_by
+from tfcompose.tools.importers.observed import Observed, parse_command_line, round_rate
 
 
 def drafted(history: TreeHistory, where: str = "", words: tuple[str, ...] = ()) -> ImportDraft:
@@ -69,7 +69,7 @@ def test_which_model_a_calibrated_camera_is_stays_a_question_where_several_fit()
 
 def test_a_second_publisher_is_named() -> None:
     draft = drafted(sound_tree().moving("map base_link", b"x"))
-    assert [one.code for one in draft.found] == ["TF020"]
+    assert [one.code for one in draft.findings] == ["TF020"]
 
 
 def test_a_publisher_that_is_no_ros_node_is_external_with_what_it_is(tmp_path: Path) -> None:
@@ -112,13 +112,13 @@ def test_a_comment_names_a_node_whose_name_is_another_one_at_each_start() -> Non
 
 
 def test_a_command_line_names_its_package() -> None:
-    assert started_by(("python3", "/ws/install/drive/lib/drive/node", "-v")) == {
+    assert parse_command_line(("python3", "/ws/install/drive/lib/drive/node", "-v")) == {
         "package": "drive",
         "executable": "node",
         "args": ["-v"],
     }
-    assert started_by(("/usr/bin/rviz2",)) == {}
-    assert started_by(()) == {}
+    assert parse_command_line(("/usr/bin/rviz2",)) == {}
+    assert parse_command_line(()) == {}
 
 
 def test_a_bag_becomes_a_robot_that_verify_finds_in_it(

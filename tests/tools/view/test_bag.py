@@ -61,18 +61,18 @@ def test_a_bag_is_scrubbed_forward_and_back(bag: Path) -> None:
     tree = tree_of(bag)
     for at_s in (0.0, 5.0, 9.95, 3.0, 0.0, 7.5):
         tree.at_s = at_s + 1e-3  # times since the epoch are exact to a microsecond
-        picture = tree.moved()
+        picture = tree.next_picture()
         assert picture, at_s
         assert picture.poses["base_link"].xyz[0] == pytest.approx(at_s)
         assert picture.poses["lidar"].xyz == pytest.approx((at_s + 0.1, 0, 0.8))
-        assert tree.moved() is None
+        assert tree.next_picture() is None
 
 
 def test_latched_frames_hold_at_any_time_also_before_they_were_recorded(tmp_path: Path) -> None:
     tree = tree_of(write_bag(tmp_path / "bag", sent(mast_m=0.7)))
     for at_s in (9.0, 0.0, 0.5, 1.0):
         tree.at_s = at_s
-        picture = tree.moved()
+        picture = tree.next_picture()
         assert picture
         assert picture.poses["mast"].xyz[2] == pytest.approx(0.7)
         assert set(picture.ghosts) == {"mast", "lidar"}
@@ -85,7 +85,7 @@ def test_a_latched_frame_that_is_replaced_has_the_value_of_the_time(tmp_path: Pa
     tree = tree_of(write_bag(tmp_path / "bag", sorted([*sent(), late], key=lambda one: one[1])))
     for at_s, height_m in ((5.9, 0.5), (6.0, 0.9), (2.0, 0.5), (9.0, 0.9)):
         tree.at_s = at_s
-        picture = tree.moved()
+        picture = tree.next_picture()
         assert picture
         assert picture.poses["mast"].xyz[2] == pytest.approx(height_m), at_s
 
@@ -93,15 +93,15 @@ def test_a_latched_frame_that_is_replaced_has_the_value_of_the_time(tmp_path: Pa
 def test_a_moving_frame_is_where_the_robot_has_it_until_it_comes(bag: Path) -> None:
     tree = tree_of(bag)
     tree.at_s = 1.99
-    tree.moved()
+    tree.next_picture()
     assert tree.about("wheel")[0] == "nothing was recorded yet at 1.99 s"
     tree.at_s = 2.0
-    picture = tree.moved()
+    picture = tree.next_picture()
     assert picture
     assert picture.poses["wheel"].quat_xyzw[1] == pytest.approx(math.sin(math.radians(1)))
     assert tree.about("wheel")[0] == "in base_link, 20 Hz, recorded 0 ms before"
     tree.at_s = 1.0
-    picture = tree.moved()
+    picture = tree.next_picture()
     assert picture
     assert picture.poses["wheel"].quat_xyzw == (0, 0, 0, 1)
 

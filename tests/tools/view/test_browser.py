@@ -79,7 +79,7 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
     panel = Panel(server, session, edit=True)
     with page_of(address_of(server), draws=True) as page:
         select_front_link(page, panel)
-        before = session.mount("front_link").given(session.mount("front_link").edge.pose)
+        before = session.mount("front_link").pose_in_file(session.mount("front_link").edge.pose)
 
         def is_dragged() -> bool:
             """Draw the tip of the arrow along z 10 cm on."""
@@ -96,7 +96,7 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
             return bool(session.moved)
 
         until(is_dragged)
-        after = session.mount("front_link").given(session.mount("front_link").edge.pose)
+        after = session.mount("front_link").pose_in_file(session.mount("front_link").edge.pose)
         page.get_by_role("button", name="undo").click()
         until(lambda: not session.moved)
         page.get_by_role("button", name="redo").click()

@@ -89,7 +89,7 @@ def test_of_many_frames_complete_levels_are_open_and_a_selected_one_is_among_the
         row.depth for row in first if row.is_open is False
     )
     assert "f299" not in [row.frame for row in first]
-    assert "f299" in [row.frame for row in tree.rows(tree.opened("f299"))]
+    assert "f299" in [row.frame for row in tree.rows(tree.open_to("f299"))]
     assert len(list(tree.rows(dict.fromkeys(parents, True)))) == 300
 
 
@@ -112,17 +112,17 @@ def test_frames_of_a_loop_or_below_an_unknown_one_have_rows_too(parents: dict[st
 def test_all_below_a_hidden_frame_is_hidden_until_it_is_shown_itself() -> None:
     tree = tree_of(ARM)
     chosen = tree.show("base_link", {}, shown=False)
-    assert tree.hidden(chosen) == ARM.keys() - {"odom"}
+    assert tree.hidden_frames(chosen) == ARM.keys() - {"odom"}
     chosen = tree.show("arm", chosen, shown=True)
-    assert tree.hidden(chosen) == {"base_link", "mast", "lidar"}
+    assert tree.hidden_frames(chosen) == {"base_link", "mast", "lidar"}
     chosen = tree.show("base_link", chosen, shown=True)
     assert chosen == {}
-    assert not tree.hidden(chosen)
+    assert not tree.hidden_frames(chosen)
 
 
 def test_a_frame_that_comes_below_a_hidden_one_is_hidden_too() -> None:
     chosen = tree_of(ARM).show("mast", {"gone": False}, shown=False)
-    assert tree_of({**ARM, "camera": "lidar", "gone": "odom"}).hidden(chosen) == {
+    assert tree_of({**ARM, "camera": "lidar", "gone": "odom"}).hidden_frames(chosen) == {
         "mast",
         "lidar",
         "camera",

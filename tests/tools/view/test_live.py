@@ -94,7 +94,7 @@ class Live:
 def test_frames_are_where_they_are_published_and_the_rest_where_the_robot_says() -> None:
     live = Live()
     live.send(DRIVE, 0.0, ("odom", "base_link", Pose((3, 0, 0), quat_from_rpy(0, 0, math.pi / 2))))
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert picture.poses["base_link"].xyz == (3, 0, 0)
     assert picture.poses["lidar"].xyz == pytest.approx((3, 0.1, 0.8))
@@ -104,17 +104,17 @@ def test_frames_are_where_they_are_published_and_the_rest_where_the_robot_says()
 def test_nothing_is_returned_while_nothing_moves() -> None:
     live = Live()
     live.run(0.1)
-    assert live.tree.moved()
-    assert live.tree.moved() is None
+    assert live.tree.next_picture()
+    assert live.tree.next_picture() is None
     live.send(DRIVE, 0.5, ("odom", "base_link", Pose((2, 0, 0))))
-    assert live.tree.moved()
+    assert live.tree.next_picture()
 
 
 def test_a_right_tree_has_neither_findings_nor_ghosts() -> None:
     live = Live()
     live.run()
-    assert live.tree.judge(FOUND_S).found == ()
-    picture = live.tree.moved()
+    assert live.tree.judge(FOUND_S).findings == ()
+    picture = live.tree.next_picture()
     assert picture
     assert (picture.ghosts, picture.wrong, picture.further) == ({}, (), {})
 
@@ -123,9 +123,9 @@ def test_what_is_off_by_more_than_the_tolerance_has_a_ghost_with_all_below_it() 
     live = Live()
     live.run(mast=Pose((0, 0, 0.6)))
     judgement = live.tree.judge(FOUND_S)
-    assert [one.code for one in judgement.found] == ["TF846"]
+    assert [one.code for one in judgement.findings] == ["TF846"]
     assert judgement.off["mast"].xyz_m == pytest.approx(0.1)
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert set(picture.ghosts) == {"mast", "lidar"}
     assert picture.ghosts["lidar"].xyz == pytest.approx((1.1, 0, 0.8))
@@ -149,7 +149,7 @@ def test_a_joint_that_moves_is_not_off_and_one_at_another_place_keeps_its_angle_
     live = Live()
     live.run(wheel=Pose((0, 0.25, 0), angle))
     live.tree.judge(FOUND_S)
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert picture.ghosts["wheel"].xyz == pytest.approx((1, 0.2, 0))
     assert picture.ghosts["wheel"].quat_xyzw == pytest.approx(angle)
@@ -160,17 +160,17 @@ def test_a_stolen_edge_is_red_until_the_thief_has_left() -> None:
     live.run()
     live.send(ROGUE, 4.0, ("odom", "base_link", Pose((9, 0, 0))))
     judgement = live.tree.judge(4.0)
-    assert [one.code for one in judgement.found] == ["TF801"]
-    assert "/rogue" in judgement.found[0].message
-    picture = live.tree.moved()
+    assert [one.code for one in judgement.findings] == ["TF801"]
+    assert "/rogue" in judgement.findings[0].message
+    picture = live.tree.next_picture()
     assert picture
     assert picture.wrong == (("odom", "base_link"),)
     assert picture.poses["base_link"].xyz == (9, 0, 0)
     assert any(line.startswith("/rogue in odom") for line in live.tree.about("base_link"))
     live.send(DRIVE, 4.05, ("odom", "base_link", Pose()))
     live.observe(4.1, {STATIC, JOINTS, DRIVE})
-    assert not live.tree.judge(4.1).found
-    picture = live.tree.moved()
+    assert not live.tree.judge(4.1).findings
+    picture = live.tree.next_picture()
     assert picture
     assert not picture.wrong
 
@@ -181,9 +181,9 @@ def test_a_frame_stays_where_a_departed_thief_put_it_until_its_owner_sends() -> 
     live.send(ROGUE, 4.1, ("base_link", "mast", Pose((2, 0, 0))))
     live.observe(4.3, live.publishers - {ROGUE})
     judgement = live.tree.judge(4.3)
-    assert (judgement.found, set(judgement.off)) == ((), {"mast"})
+    assert (judgement.findings, set(judgement.off)) == ((), {"mast"})
     assert "mast" in judgement.summary
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert (picture.poses["mast"].xyz, picture.ghosts["mast"].xyz) == ((3, 0, 0), (1, 0, 0.5))
     live.send(STATIC, 4.4, ("base_link", "mast", Pose((0, 0, 0.5))), static=True)
@@ -196,7 +196,7 @@ def test_a_silent_edge_is_red() -> None:
     live.observe(8.0, {STATIC, JOINTS, DRIVE})
     judgement = live.tree.judge(8.0)
     assert judgement.wrong == {"base_link"}
-    assert {one.code for one in judgement.found} == {"TF804"}
+    assert {one.code for one in judgement.findings} == {"TF804"}
 
 
 @pytest.mark.parametrize("silence_s", [2.0, 25.0])
@@ -210,17 +210,17 @@ def test_a_silence_that_is_over_is_red_for_some_seconds_only(silence_s: float) -
         return begun_s + seconds
 
     at_s = send(OVER_S - 0.5, 8.0 + silence_s)
-    [found] = live.tree.judge(at_s).found
+    [found] = live.tree.judge(at_s).findings
     assert found.code == "TF804"
     assert live.tree.judgement.wrong == {"base_link"}
     at_s = send(1.0, at_s)
-    assert not live.tree.judge(at_s).found
+    assert not live.tree.judge(at_s).findings
 
 
 def test_what_may_still_come_is_not_missing() -> None:
     live = Live()
     live.send(DRIVE, 0.0, ("odom", "base_link", Pose()))
-    assert not live.tree.judge(FOUND_S / 2).found
+    assert not live.tree.judge(FOUND_S / 2).findings
     assert live.tree.judge(FOUND_S).wrong == {"mast", "lidar", "wheel"}
     assert live.tree.about("mast")[0] == "nothing came from static yet"
 
@@ -229,8 +229,8 @@ def test_frames_that_nobody_declared_are_shown_where_they_are() -> None:
     live = Live()
     live.run()
     live.send(ROGUE, 4.0, ("lidar", "<b>spy</b>", Pose((1, 0, 0))))
-    assert [one.code for one in live.tree.judge(4.0).found] == ["TF803"]
-    picture = live.tree.moved()
+    assert [one.code for one in live.tree.judge(4.0).findings] == ["TF803"]
+    picture = live.tree.next_picture()
     assert picture
     assert picture.further["<b>spy</b>"].xyz == pytest.approx((2.1, 0, 0.8))
 
@@ -240,7 +240,7 @@ def test_a_frame_below_another_parent_moves_there_and_its_line_with_it() -> None
     live.run()
     live.send(ROGUE, 4.0, ("base_link", "lidar", Pose((0, 0, 2))), static=False)
     assert live.tree.judge(4.0).wrong == {"lidar"}
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert picture.poses["lidar"].xyz == pytest.approx((1, 0, 2))
     edge = picture.robot.parent_edge("lidar")
@@ -254,7 +254,7 @@ def test_what_tf2_does_not_take_moves_nothing_and_is_red() -> None:
     live.run()
     live.send(DRIVE, 4.0, ("odom", "base_link", Pose((math.nan, 0, 0))))
     assert live.tree.judge(4.0).wrong == {"base_link"}
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert all(math.isfinite(value) for pose in picture.poses.values() for value in pose.xyz)
 
@@ -264,23 +264,23 @@ def test_what_is_in_one_tree_with_the_fixed_frame_is_shown_from_there() -> None:
     live.run(mast=Pose((0, 0, 0.6), quat_from_rpy(0, 0, math.pi / 2)))
     live.send(ROGUE, 4.0, ("island", "palm", Pose((7, 0, 0))))
     live.tree.judge(FOUND_S)
-    assert live.tree.moved()
+    assert live.tree.next_picture()
     live.tree.fixed = "mast"
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert picture.poses["mast"].xyz == pytest.approx((0, 0, 0))
     assert picture.poses["lidar"].xyz == pytest.approx((0.1, 0, 0.3))
     assert picture.poses["odom"].xyz == pytest.approx((0, 1, -0.6))
     assert picture.ghosts["mast"].xyz == pytest.approx((0, 0, -0.1))
     assert picture.further["palm"].xyz == (7, 0, 0)
-    assert live.tree.moved() is None
+    assert live.tree.next_picture() is None
 
 
 def test_a_loop_is_shown_all_the_same() -> None:
     live = Live()
     live.run()
     live.send(ROGUE, 4.0, ("lidar", "base_link", Pose((1, 0, 0))))
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert picture.poses.keys() == live.robot.frames.keys()
 
@@ -293,7 +293,7 @@ def test_names_on_the_tree_may_have_a_prefix() -> None:
     )
     live = Live(robot)
     live.send(DRIVE, 0.0, ("odom", "r1/base_link", Pose((2, 0, 0))))
-    picture = live.tree.moved()
+    picture = live.tree.next_picture()
     assert picture
     assert picture.poses["base_link"].xyz == (2, 0, 0)
     assert not picture.further
@@ -326,12 +326,12 @@ def test_the_plan_is_judged_of_which_the_robot_is_another_version() -> None:
     live = Live()
     smaller = replace(
         live.robot,
-        frames={frame: at for frame, at in live.robot.frames.items() if frame != "lidar"},
+        frames={frame: span for frame, span in live.robot.frames.items() if frame != "lidar"},
         edges=tuple(edge for edge in live.robot.edges if edge.child != "lidar"),
     )
     live.tree = LiveTree(smaller, live.plan, {GLOBAL: live.observer}, TOLERANCE)
     live.run()
-    assert not live.tree.judge(FOUND_S).found
-    picture = live.tree.moved()
+    assert not live.tree.judge(FOUND_S).findings
+    picture = live.tree.next_picture()
     assert picture
     assert set(picture.further) == {"lidar"}

@@ -171,8 +171,8 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(view: View, nodes:
             assert until(lambda: view.is_red)
             took_s = time.monotonic() - begun
             assert sent()
-            assert [one.code for one in view.judgement.found] == ["TF801"]
-            assert f"/rogue{number}" in view.judgement.found[0].message
+            assert [one.code for one in view.judgement.findings] == ["TF801"]
+            assert f"/rogue{number}" in view.judgement.findings[0].message
         return took_s < 1
 
     assert in_one_of_a_few(is_found)
@@ -222,11 +222,11 @@ def test_a_file_that_changes_is_followed_from_then_on(
     moved = EXTERNAL.replace("xyz: [0, 0, 0.3]", "xyz: [0, 0, 0.4]")
     (tmp_path / "rover.yaml").write_text(moved, "utf-8")
     view.changed.set()
-    assert until(lambda: [one.code for one in view.judgement.found] == ["TF846"])
+    assert until(lambda: [one.code for one in view.judgement.findings] == ["TF846"])
     assert until(lambda: view.server.scene.get_handle_by_name("/ghost/2") is not None)
     (tmp_path / "rover.yaml").write_text(EXTERNAL + "  odom2: [\n", "utf-8")
     view.changed.set()
     assert until(lambda: "TF" in view.windows.panels[0].found)
     (tmp_path / "rover.yaml").write_text(EXTERNAL, "utf-8")
     view.changed.set()
-    assert until(lambda: not view.judgement.found and not view.windows.panels[0].found)
+    assert until(lambda: not view.judgement.findings and not view.windows.panels[0].found)

@@ -57,7 +57,7 @@ def test_a_moved_mount_is_saved_as_one_line_and_its_comment_stays(
     panel = Panel(server, session, edit=True)
     panel.tree.select("front_link")
     mount = session.mount("front_link")
-    given = mount.given(mount.edge.pose)
+    given = mount.pose_in_file(mount.edge.pose)
     panel.move(Pose((0.5, *given.xyz[1:]), given.quat_xyzw))
     panel.save()
     after = rover.read_text("utf-8").splitlines()
@@ -94,7 +94,9 @@ def test_the_gizmo_is_where_a_typed_pose_puts_the_mount(
 ) -> None:
     panel = Panel(server, session_of(rover), edit=True)
     panel.tree.select("front_link")
-    given = panel.session.mount("front_link").given(panel.session.mount("front_link").edge.pose)
+    given = panel.session.mount("front_link").pose_in_file(
+        panel.session.mount("front_link").edge.pose
+    )
     panel.move(Pose((0.5, 0.1, 0.7), given.quat_xyzw))
     assert panel.gizmo.position == pytest.approx(panel.poses()["front_link"].xyz)
     assert panel.poses()["front_link"].xyz == pytest.approx((0.5, 0.1, 0.7))

@@ -101,20 +101,20 @@ def run(arguments: Namespace) -> int:
     return code
 
 
-def _print(found: list[Finding], form: str) -> int:
+def _print(findings: list[Finding], form: str) -> int:
     """Print the findings and return the exit code."""
     if form == "json":
         from tfcompose.compiler.render.formats import render_json
 
-        sys.stdout.write(render_json(found))
+        sys.stdout.write(render_json(findings))
     else:
-        print_findings(found, sys.stdout)
-    return exit_code_of(found) if found else 0
+        print_findings(findings, sys.stdout)
+    return exit_code_of(findings) if findings else 0
 
 
-def _summary(found: list[Finding]) -> str:
-    errors = sum(finding.severity == "error" for finding in found)
-    counts = ((errors, "error"), (len(found) - errors, "warning"))
+def _summary(findings: list[Finding]) -> str:
+    errors = sum(finding.severity == "error" for finding in findings)
+    counts = ((errors, "error"), (len(findings) - errors, "warning"))
     return " and ".join(plural(n, noun) for n, noun in counts if n) or "nothing is wrong"
 
 

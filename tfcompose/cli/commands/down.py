@@ -38,21 +38,21 @@ def run(arguments: Namespace) -> int:
 
     if arguments.leftovers:
         return _stop_leftovers(arguments.robot)
-    place = chosen_run(arguments.robot, "down")
-    if request(place, DownRequest(), Done) is None:
+    runtime_dir = chosen_run(arguments.robot, "down")
+    if request(runtime_dir, DownRequest(), Done) is None:
         return FAILED
     try:
-        for notice, _ in notices(place, arguments.timeout):
+        for notice, _ in notices(runtime_dir, arguments.timeout):
             if isinstance(notice, Ended):
                 break
     except TimeoutError:
         fail(
-            f"{place.name} has not ended after {arguments.timeout:g} s; tfcompose ps lists what"
-            " still runs"
+            f"{runtime_dir.name} has not ended after {arguments.timeout:g} s; tfcompose ps lists"
+            " what still runs"
         )
     except OSError:
         pass  # it has ended already
-    print(f"{place.name} has ended")
+    print(f"{runtime_dir.name} has ended")
     return 0
 
 
@@ -61,8 +61,10 @@ def _stop_leftovers(robot: str | None) -> int:
     from tfcompose.launcher.leftovers import end, leftovers
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
-    place = chosen_run(robot, "down --leftovers", among=lambda: runtime_dirs(os.environ))
-    found = [leftover for leftover in leftovers(f"{place.name}:") if leftover.launcher is None]
+    runtime_dir = chosen_run(robot, "down --leftovers", among=lambda: runtime_dirs(os.environ))
+    found = [
+        leftover for leftover in leftovers(f"{runtime_dir.name}:") if leftover.launcher is None
+    ]
     for leftover in found:
         print(f"stopping {leftover.pid}: {leftover.command}")
     rest = end(found)

@@ -34,17 +34,17 @@ def run(arguments: Namespace) -> int:
     from tfcompose.model.messages import Ended, notice_line
     from tfcompose.model.plan import Plan, RosSettings
 
-    place = chosen_run(arguments.robot, "events")
+    runtime_dir = chosen_run(arguments.robot, "events")
     lines = _TimedLines()
     ended = False
     console = Console(
-        Plan(place.name, "", None, ros=RosSettings(), edges=(), processes=()),
+        Plan(runtime_dir.name, "", None, ros=RosSettings(), edges=(), processes=()),
         lines,
         colour=is_coloured(sys.stdout),
         address_of=code_addresses(sys.stdout),
     )
     try:
-        for notice, at in notices(place, output=sys.stdout):
+        for notice, at in notices(runtime_dir, output=sys.stdout):
             ended = isinstance(notice, Ended)
             if arguments.format == "json":
                 print(notice_line(notice, at))
@@ -55,21 +55,21 @@ def run(arguments: Namespace) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:
-        fail(f"{place.name} does not answer: {error}")
+        fail(f"{runtime_dir.name} does not answer: {error}")
     if ended:
         return 0
     slow = "reports faster than this terminal reads; run events again"
-    warn(f"{place.name} {slow if _is_held(place) else 'was killed'}")
+    warn(f"{runtime_dir.name} {slow if _is_held(runtime_dir) else 'was killed'}")
     return FAILED
 
 
-def _is_held(place: RuntimeDir) -> bool:
+def _is_held(runtime_dir: RuntimeDir) -> bool:
     """Return whether the robot still runs.
 
     One that ends hangs up a moment before it gives its lock back.
     """
     for _ in range(40):
-        if place.holder() is None:
+        if runtime_dir.holder() is None:
             return False
         time.sleep(0.05)
     return True

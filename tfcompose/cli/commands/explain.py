@@ -61,9 +61,9 @@ def run(arguments: Namespace) -> int:
 
 
 def _explain_frames(file: str, a: str, b: str, arguments: Namespace) -> None:
-    from tfcompose.cli.compiling import compiled_without_errors
+    from tfcompose.cli.compiling import compile_without_errors
 
-    robot, compiled = compiled_without_errors(file, arguments)
+    robot, compiled = compile_without_errors(file, arguments)
     _explain_chain(robot, compiled.sources, a, b)
 
 
@@ -96,7 +96,7 @@ def _line(edge: Edge, sources: Sequence[Source]) -> str:
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
     measured = f"          {_explain_calibration(edge.calibration)}\n" if edge.calibration else ""
     values = "".join(f"          {line}\n" for line in values_of(edge, sources))
-    at = f"          {edge.at}{inside}\n" if inside or not values else ""
+    at = f"          {edge.span}{inside}\n" if inside or not values else ""
     return f"{edge.name}\n          {facts}\n{measured}{at}{values}"
 
 

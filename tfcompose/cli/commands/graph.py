@@ -161,9 +161,9 @@ def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
 
 def _published_graph(arguments: Namespace) -> Graph:
     """Return the published tree as a graph."""
-    from tfcompose.cli.live import observed_for
+    from tfcompose.cli.live import observe_for
 
-    plan, observers = observed_for("tfcompose_graph", arguments)
+    plan, observers = observe_for("tfcompose_graph", arguments)
     title = arguments.bag or (plan.robot if plan else next(iter(observers))[0])
     return graph_of_observers(list(observers.values()), title, plan, poses=arguments.poses)
 

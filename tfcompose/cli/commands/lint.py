@@ -189,11 +189,11 @@ def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[
     else:
         cases = {file: lint(file, read) for file in robots}
     cases |= {file: _select_findings(linter.lint_urdf(file, read), arguments) for file in urdfs}
-    found = [finding for case in cases.values() for finding in case]
+    findings = [finding for case in cases.values() for finding in case]
     _print(cases, arguments, len(robots) + len(urdfs))
-    if exit_code_of(found) == UNREADABLE:
+    if exit_code_of(findings) == UNREADABLE:
         return UNREADABLE
-    return int(is_changed or any(finding.severity in _failing(arguments) for finding in found))
+    return int(is_changed or any(finding.severity in _failing(arguments) for finding in findings))
 
 
 def _watch(arguments: Namespace, environment: Mapping[str, str]) -> int:
@@ -249,14 +249,14 @@ def _files(arguments: Namespace) -> list[str]:
     return [file for file in files if not file.endswith(YAML_ENDINGS) or is_robot(file)]
 
 
-def _select_findings(found: list[Finding], arguments: Namespace) -> list[Finding]:
+def _select_findings(findings: list[Finding], arguments: Namespace) -> list[Finding]:
     """Return the findings that --select and --ignore leave."""
     from tfcompose.foundation.catalogue import CATALOGUE
 
     select, ignore = tuple(arguments.select), tuple(arguments.ignore)
     return [
         finding
-        for finding in found
+        for finding in findings
         if not CATALOGUE[finding.code].can_be_allowed
         or (
             (not select or finding.code.startswith(select)) and not finding.code.startswith(ignore)
@@ -294,21 +294,21 @@ def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
 
 def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) -> None:
     """Print the findings of each file; beside a difference, to stderr."""
-    form, found = arguments.format, [finding for case in cases.values() for finding in case]
+    form, findings = arguments.format, [finding for case in cases.values() for finding in case]
     if form == "text":
         from tfcompose.compiler.render.text import summary
 
         stream = sys.stderr if arguments.diff else sys.stdout
-        print_findings(found, stream, most=None if arguments.all else MOST_OF_ONE_CODE)
-        stream.write(summary(found, files, warnings_fail=arguments.fail_on == "warning"))
+        print_findings(findings, stream, most=None if arguments.all else MOST_OF_ONE_CODE)
+        stream.write(summary(findings, files, warnings_fail=arguments.fail_on == "warning"))
     elif form == "json":
         from tfcompose.compiler.render.formats import render_json
 
-        sys.stdout.write(render_json(found))
+        sys.stdout.write(render_json(findings))
     elif form == "github":
         from tfcompose.compiler.render.formats import render_github
 
-        sys.stdout.write(render_github(found))
+        sys.stdout.write(render_github(findings))
     elif form == "junit":
         from tfcompose.compiler.render.formats import render_junit
 
@@ -317,4 +317,4 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
     else:
         from tfcompose.compiler.render.formats import render_sarif
 
-        sys.stdout.write(render_sarif(found, __version__))
+        sys.stdout.write(render_sarif(findings, __version__))

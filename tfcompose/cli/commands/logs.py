@@ -82,29 +82,29 @@ def run(arguments: Namespace) -> int:
     from tfcompose.foundation.findings import did_you_mean
     from tfcompose.launcher.output import Follower, logged_processes, read_logs, runs_of
 
-    place = _place(arguments.robot, shlex.join(["logs", *arguments.name]))
-    known = logged_processes(place.logs)
+    runtime_dir = _runtime_dir(arguments.robot, shlex.join(["logs", *arguments.name]))
+    known = logged_processes(runtime_dir.logs)
     for name in arguments.name:
         if name not in known:
             advice = did_you_mean(name, known, f"there are logs of {', '.join(known)}")
-            fail(f"{place.name} has no log of {name}; {advice}")
+            fail(f"{runtime_dir.name} has no log of {name}; {advice}")
     names = arguments.name or known
     if arguments.previous and arguments.follow:
         fail("--previous prints a run that has ended: leave out --follow", UNREADABLE)
-    *earlier, begin_s = [0.0, *runs_of(place.logs)]
+    *earlier, begin_s = [0.0, *runs_of(runtime_dir.logs)]
     end_s = math.inf
     if arguments.previous:
         if not any(earlier):
-            fail(f"no run of {place.name} before this one is known")
+            fail(f"no run of {runtime_dir.name} before this one is known")
         begin_s, end_s = earlier[-1], begin_s
     elif arguments.since is not None:
         begin_s = arguments.since
-    follower = Follower(place.logs, names)
+    follower = Follower(runtime_dir.logs, names)
     printer = _LogPrinter(known, names, times=arguments.times)
-    lines = read_logs(place.logs, names, begin_s, end_s)
+    lines = read_logs(runtime_dir.logs, names, begin_s, end_s)
     printer.print(lines if arguments.lines is None else deque(lines, maxlen=arguments.lines))
     while arguments.follow:
-        ended = place.holder() is None
+        ended = runtime_dir.holder() is None
         printer.print(follower.more())
         if ended:
             break
@@ -114,7 +114,7 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _place(robot: str | None, command: str) -> RuntimeDir:
+def _runtime_dir(robot: str | None, command: str) -> RuntimeDir:
     """Return the robot that runs, or the one that has run last.
 
     Of those that the name, or else this shell, means.
@@ -124,12 +124,20 @@ def _place(robot: str | None, command: str) -> RuntimeDir:
     from tfcompose.launcher.output import last_modified
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
-    there = [place for place in runtime_dirs(os.environ) if is_folder(place.logs)]
-    matching = [place for place in there if is_meant(place, robot)] if robot else in_scope(there)
-    running = [place for place in matching if place.holder()]
+    there = [
+        runtime_dir for runtime_dir in runtime_dirs(os.environ) if is_folder(runtime_dir.logs)
+    ]
+    matching = (
+        [runtime_dir for runtime_dir in there if is_meant(runtime_dir, robot)]
+        if robot
+        else in_scope(there)
+    )
+    running = [runtime_dir for runtime_dir in matching if runtime_dir.holder()]
     if matching and len(running) <= 1:
         return (
-            running[0] if running else max(matching, key=lambda place: last_modified(place.logs))
+            running[0]
+            if running
+            else max(matching, key=lambda runtime_dir: last_modified(runtime_dir.logs))
         )
     return chosen_run(robot, command, among=lambda: running or there)
 

@@ -66,8 +66,8 @@ def run(arguments: Namespace) -> int:
         state += f", without {', '.join(failed)}" if failed else ""
         state += f", {_count_by_severity(status.findings)}" if status.findings else ""
         print(f"{name}: {state}, launcher {status.launcher}, since {uptime(status.uptime)}")
-        for found in status.findings:
-            print(f"  {found.severity}[{found.code}] {found.message}")
+        for finding in status.findings:
+            print(f"  {finding.severity}[{finding.code}] {finding.message}")
         rows = [HEAD, *(row(process, used) for process in status.processes)]
         print(
             *TABLE.lines(
@@ -80,7 +80,7 @@ def run(arguments: Namespace) -> int:
 
 def _count_by_severity(findings: Sequence[Finding]) -> str:
     """Return how many errors and warnings there are: "1 error and 2 warnings"."""
-    counts = Counter(found.severity for found in findings)
+    counts = Counter(finding.severity for finding in findings)
     return " and ".join(plural(counts[kind], kind) for kind in counts)
 
 
@@ -94,7 +94,7 @@ def _exit_code(fail_on: str | None, robots: Mapping[str, RobotStatus]) -> int:
         has_failed = any(process.failed for process in status.processes)
         if has_failed and severities:
             return FAILED
-        if any(found.severity in severities for found in status.findings):
+        if any(finding.severity in severities for finding in status.findings):
             return FAILED
     return 0
 
@@ -106,10 +106,17 @@ def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
     from tfcompose.model.messages import RobotStatus, StatusRequest
 
     try:
-        places = [place for place, _ in running() if name is None or is_meant(place, name)]
+        places = [
+            runtime_dir
+            for runtime_dir, _ in running()
+            if name is None or is_meant(runtime_dir, name)
+        ]
     except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
-    answers = {place.name: request(place, StatusRequest(), RobotStatus) for place in places}
+    answers = {
+        runtime_dir.name: request(runtime_dir, StatusRequest(), RobotStatus)
+        for runtime_dir in places
+    }
     found = {name: status for name, status in answers.items() if status is not None}
     return found, 0 if len(found) == len(answers) else FAILED
 

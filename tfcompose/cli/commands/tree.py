@@ -132,11 +132,11 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
 
 def _print_published(arguments: Namespace) -> None:
     from tfcompose.cli.edge_table import not_kept
-    from tfcompose.cli.live import observed_for
+    from tfcompose.cli.live import observe_for
     from tfcompose.model.plan.topics import parts_of
     from tfcompose.tf.live.edges import forest
 
-    plan, observers = observed_for("tfcompose_tree", arguments)
+    plan, observers = observe_for("tfcompose_tree", arguments)
     parts = parts_of(plan) if plan else {}
     for pair, observer in observers.items():
         planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
@@ -259,7 +259,7 @@ def _status(branch: Branch, plan: Plan) -> str:
     if observed is None:
         return "missing"
     if planned is None:
-        allowed = plan.may_be_undeclared(observed.stream.parent, observed.stream.child)
+        allowed = plan.allows_undeclared(observed.stream.parent, observed.stream.child)
         return "allowed" if allowed else "unexpected"
     owner = not observed.nodes or may_be_owners(planned, observed.nodes, relays_of(plan))
     code = code_of(

@@ -64,7 +64,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
-    from tfcompose.cli.live import observed, refuse_live_bag
+    from tfcompose.cli.live import observe_topics, refuse_live_bag
     from tfcompose.cli.plans import expected_plan
     from tfcompose.guard.verdict.verify import verify
     from tfcompose.model.plan.topics import joint_states_topics, parts_of
@@ -78,7 +78,7 @@ def run(arguments: Namespace) -> int:
     # Programs get each missing edge; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()
-    observers = observed(
+    observers = observe_topics(
         "tfcompose_verify",
         parts_of(plan),
         bag=arguments.bag,
@@ -141,33 +141,33 @@ def of_other_plan(verdict: Verdict, running: Plan) -> Verdict:
 
     advice = "tfcompose verify --running compares with the plan that runs"
     nodes = [node for process in running.processes for node in process.nodes]
-    found = list(verdict.found)
-    for index, finding in enumerate(found):
+    findings = list(verdict.findings)
+    for index, finding in enumerate(findings):
         if any(node in finding.message for node in nodes):
-            found[index] = replace(finding, help=advice)
-    return replace(verdict, found=tuple(found))
+            findings[index] = replace(finding, help=advice)
+    return replace(verdict, findings=tuple(findings))
 
 
 def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:
     """Print the verdicts and return the exit code."""
     failing = frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
-    found = [finding for verdict in verdicts for finding in verdict.found]
+    findings = [finding for verdict in verdicts for finding in verdict.findings]
     if arguments.format == "junit":
         from tfcompose.compiler.render.formats import render_junit
 
         holders = {None: "undeclared", "": "tree"}
         cases = [
-            (holders.get(verdict.owner) or str(verdict.owner), verdict.edge, verdict.found)
+            (holders.get(verdict.owner) or str(verdict.owner), verdict.edge, verdict.findings)
             for verdict in verdicts
         ]
         sys.stdout.write(render_junit(plan.robot, cases, failing=failing, seconds=seconds))
     elif arguments.format == "json":
         from tfcompose.compiler.render.formats import render_json
 
-        sys.stdout.write(render_json(found))
+        sys.stdout.write(render_json(findings))
     else:
         from tfcompose.guard.verdict.verify import summary
 
-        print_findings(found, sys.stdout)
+        print_findings(findings, sys.stdout)
         print(f"{plan.robot}: {summary(verdicts)}, in {arguments.bag or 'the running tree'}")
-    return int(any(finding.severity in failing for finding in found))
+    return int(any(finding.severity in failing for finding in findings))

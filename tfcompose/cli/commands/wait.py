@@ -35,17 +35,17 @@ def run(arguments: Namespace) -> int:
     from tfcompose.cli.runs import chosen_run, notices, wait_until_ready
     from tfcompose.model.messages import Ended
 
-    place = chosen_run(arguments.robot, "wait")
+    runtime_dir = chosen_run(arguments.robot, "wait")
     if arguments.ready:
-        return wait_until_ready(place, arguments.timeout, without_errors=True)
+        return wait_until_ready(runtime_dir, arguments.timeout, without_errors=True)
     try:
-        for notice, _ in notices(place, arguments.timeout):
+        for notice, _ in notices(runtime_dir, arguments.timeout):
             if isinstance(notice, Ended):
                 return notice.exit_code
     except TimeoutError:
-        warn(f"{place.name} still runs after {arguments.timeout:g} s")
+        warn(f"{runtime_dir.name} still runs after {arguments.timeout:g} s")
     except OSError as error:
-        warn(f"{place.name} does not answer: {error}")
+        warn(f"{runtime_dir.name} does not answer: {error}")
     else:
-        warn(f"{place.name} was killed")
+        warn(f"{runtime_dir.name} was killed")
     return FAILED

@@ -6,22 +6,22 @@ rules and applies the comments that allow findings.
 
 from tfcompose.compiler.check.check import (
     RULES,
+    add_replaced_notes,
     apply,
     check,
     rules_of_tools,
     silence,
     unused_allows,
-    with_replaced,
 )
 from tfcompose.compiler.check.rule import Rule
 
 __all__ = [
     "RULES",
     "Rule",
+    "add_replaced_notes",
     "apply",
     "check",
     "rules_of_tools",
     "silence",
     "unused_allows",
-    "with_replaced",
 ]

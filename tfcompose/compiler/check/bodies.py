@@ -31,16 +31,16 @@ def inertia_missing(robot: Robot) -> Iterator[Finding]:
     other = next((edge.child for edge in moving if _has_one(own, fixed, edge.child)), None)
     for edge in moving if other else ():
         if not _has_one(masses, fixed, edge.child):
-            at = robot.links[edge.child].at
+            span = robot.links[edge.child].span
             message = f"{edge.child}, moved by {edge.joint_name}, has no mass; {other} has one"
             advice = '<inertial> with <mass value="…"/> and <inertia …/>'
-            if not robot.is_foreign(at):
+            if not robot.is_foreign(span):
                 link = robot.links[edge.child]
                 shape = (
                     "" if link.visuals or link.collisions else ", visual: {box: [0.1, 0.1, 0.1]}"
                 )
                 advice = f"inertial: {{mass: 0.5 kg}}{shape}"
-            yield finding("TF709", message, at, help=f"add {advice}")
+            yield finding("TF709", message, span, help=f"add {advice}")
 
 
 def _has_one(names: set[str], fixed: dict[str, list[str]], link: str) -> bool:
@@ -64,14 +64,14 @@ _ROUNDING = 0.01
 def impossible_inertia(robot: Robot) -> Iterator[Finding]:
     for link in robot.links.values():
         inertial = link.inertial
-        if inertial is None or inertial.at is None:
+        if inertial is None or inertial.span is None:
             continue
         if why := _impossible(inertial.tensor):
             advice = "remove inertia: it is computed from mass and shape"
-            if robot.is_foreign(inertial.at):
+            if robot.is_foreign(inertial.span):
                 advice = "take the tensor from CAD, in kg m² and about the centre of mass"
             yield finding(
-                "TF710", f"impossible inertia of {link.name}: {why}", inertial.at, help=advice
+                "TF710", f"impossible inertia of {link.name}: {why}", inertial.span, help=advice
             )
 
 
@@ -139,12 +139,12 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
         if not ratios or trace <= 0 or any(1 / times < ratio < times for ratio in ratios):
             continue
         ratio = min(ratios, key=lambda candidate: abs(math.log(candidate)))
-        at = inertial.at or link.at
+        span = inertial.span or link.span
         message = f"inertia of {link.name} is {ratio:.3g} times what its mass and shape give"
         advice = "give it in kg m², about the centre of mass"
-        if not robot.is_foreign(at):
+        if not robot.is_foreign(span):
             advice += ", or remove inertia: it is computed"
-        yield finding("TF711", message, at, help=advice)
+        yield finding("TF711", message, span, help=advice)
 
 
 def _of_boxes(mass: float, link: Link) -> tuple[float, ...]:
@@ -173,12 +173,12 @@ def density_of_no_material(robot: Robot) -> Iterator[Finding]:
                 f" {density:.2g} kg/m³, and the densest metal has 22600"
             )
             grams = f"{inertial.mass / 1000:g}"
-            if not robot.is_foreign(link.at):
+            if not robot.is_foreign(link.span):
                 grams = f"mass: {inertial.mass:g} g"
             advice = "check its mass, in kg, and the sizes of its shapes, in m"
             if density > _DENSE_IN_GRAMS:
                 advice = f"if grams are meant, write {grams}; otherwise check its sizes, in m"
-            yield finding("TF732", message, inertial.mass_at or link.at, help=advice)
+            yield finding("TF732", message, inertial.mass_at or link.span, help=advice)
         elif inertial := _lighter_than_air(link):
             volume = _most_volume((*link.visuals, *link.collisions))
             message = (
@@ -186,7 +186,7 @@ def density_of_no_material(robot: Robot) -> Iterator[Finding]:
                 f" has {volume * _AIR:.2g} kg"
             )
             advice = "check its mass, in kg, and the sizes of its shapes, in m"
-            yield finding("TF732", message, inertial.mass_at or link.at, help=advice)
+            yield finding("TF732", message, inertial.mass_at or link.span, help=advice)
 
 
 #: Of air at sea level, in kg/m³.
@@ -242,22 +242,22 @@ def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
     root = robot.links.get(robot.base or "")
     if root is None or root.inertial is None:
         return
-    if robot.is_foreign(root.at):
+    if robot.is_foreign(root.span):
         message = f"root link {root.name} has an inertia, which robot_state_publisher ignores"
         advice = (
             "add a root without a body: a link such as base_footprint, and a fixed joint from it"
             f" to {root.name}"
         )
-        yield finding("TF712", message, root.at, help=advice)
+        yield finding("TF712", message, root.span, help=advice)
         return
     for process in robot.processes:
         if (
             process.package in _KDL_READERS and not process.describes
         ):  # what tfcompose starts gets a root without one
             message = f"root link {root.name} has an inertia, which {process.package} ignores"
-            notes = [Note(f"{process.name} is defined here", process.at)]
+            notes = [Note(f"{process.name} is defined here", process.span)]
             advice = f"give {root.name} a parent without a body, such as base_footprint"
-            yield finding("TF712", message, root.at, help=advice, notes=notes)
+            yield finding("TF712", message, root.span, help=advice, notes=notes)
             return
 
 
@@ -277,11 +277,11 @@ def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
         link_name, material = next(iter(links.items()))
         them = with_more(link_name, len(links) - 1, "link")
         message = f"material {name} has another colour in {them} than in its definition"
-        notes = [Note(f"{name} is first defined here", first[name].at)]
+        notes = [Note(f"{name} is first defined here", first[name].span)]
         advice = "rename one of them"
-        if not robot.is_foreign(material.at):
+        if not robot.is_foreign(material.span):
             advice += ", or give the name only: it then has the colour of the first"
-        yield finding("TF713", message, material.at, help=advice, notes=notes)
+        yield finding("TF713", message, material.span, help=advice, notes=notes)
 
 
 def _appearance(material: Material) -> tuple[object, ...]:
@@ -297,7 +297,7 @@ def material_without_colour(robot: Robot) -> Iterator[Finding]:
         if not (material.rgba or material.texture) and material.name not in known:
             advice = did_you_mean(material.name, known, "add rgba: [0.5, 0.5, 0.5, 1]")
             yield finding(
-                "TF714", f"material {material.name} has no colour", material.at, help=advice
+                "TF714", f"material {material.name} has no colour", material.span, help=advice
             )
 
 
@@ -315,7 +315,7 @@ def body_in_no_urdf(robot: Robot) -> Iterator[Finding]:
     bodies = (
         link for link in robot.links.values() if link.visuals or link.collisions or link.inertial
     )
-    outside = {link.name: link.at for link in bodies if link.name not in described}
+    outside = {link.name: link.span for link in bodies if link.name not in described}
     tree = next(
         (robot.below(root) for root in robot.roots() if robot.base in robot.below(root)),
         set[str](),

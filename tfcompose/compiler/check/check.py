@@ -91,12 +91,12 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
     of the robot has no use for, and warnings about parts from a URDF: ``lint`` of their files
     reports them.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for rule in rules:
         if rule.idle and robot.is_variant:
             continue
         try:
-            found += [
+            findings += [
                 _of_part(entry, robot)
                 for entry in rule.find(robot)
                 if not _is_left_out(entry, rule, robot)
@@ -104,7 +104,7 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
         except Exception as error:  # noqa: BLE001 (a rule's fault must not hide the others' findings)
             name = CATALOGUE[rule.code].name
             message = f"rule {rule.code} {name} crashed: {type(error).__name__}: {error}"
-            found.append(
+            findings.append(
                 finding(
                     "TF903",
                     message,
@@ -112,17 +112,17 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
                     help="this is a bug in tfcompose: please report it",
                 )
             )
-    return _at_shared_values(found)
+    return _at_shared_values(findings)
 
 
-def _at_shared_values(found: list[Finding]) -> list[Finding]:
+def _at_shared_values(findings: list[Finding]) -> list[Finding]:
     """Return one finding for a value that several entries share through a YAML anchor.
 
     The others stand in its notes.
     """
     by_place: dict[tuple[str, Span], list[Finding]] = {}
     single = []
-    for entry in found:
+    for entry in findings:
         if entry.span is not None and entry.code in _OF_VALUES:
             by_place.setdefault((entry.code, entry.span), []).append(entry)
         else:
@@ -137,37 +137,41 @@ def _at_shared_values(found: list[Finding]) -> list[Finding]:
 def rules_of_tools(robot: Robot) -> tuple[list[Rule], list[Finding]]:
     """Return the rules of tools whose sections the file has, and load failures."""
     rules: list[Rule] = []
-    found = []
+    findings = []
     for key in keys_in(robot.sections):
         try:
             module = vars(load(key.rules)) if key.rules else {}
         except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
             message = f"the rules of {key.name} cannot be loaded: {type(error).__name__}: {error}"
             advice = f"repair or uninstall it: {key.rules}"
-            at = robot.sections[key.name].at()
-            found.append(finding("TF921", message, at, help=advice))
+            span = robot.sections[key.name].span_of()
+            findings.append(finding("TF921", message, span, help=advice))
             continue
         rules += [value for value in module.values() if isinstance(value, Rule)]
-    return rules, found
+    return rules, findings
 
 
-def _is_left_out(found: Finding, rule: Rule, robot: Robot) -> bool:
-    at = found.span
-    if at is None:
+def _is_left_out(finding: Finding, rule: Rule, robot: Robot) -> bool:
+    span = finding.span
+    if span is None:
         return False
-    if rule.follows == "pose" and any(entry.holds(at) for entry in robot.refused):
+    if rule.follows == "pose" and any(entry.holds(span) for entry in robot.refused):
         return True
-    return found.severity == "warning" and at.file in robot.foreign and at.file in robot.part_notes
+    return (
+        finding.severity == "warning"
+        and span.file in robot.foreign
+        and span.file in robot.part_notes
+    )
 
 
-def _of_part(found: Finding, robot: Robot) -> Finding:
+def _of_part(finding: Finding, robot: Robot) -> Finding:
     """Return the finding, with a note for each part whose file it is about."""
-    notes = robot.part_notes.get(found.span.file, ()) if found.span else ()
-    return replace(found, notes=(*found.notes, *notes)) if notes else found
+    notes = robot.part_notes.get(finding.span.file, ()) if finding.span else ()
+    return replace(finding, notes=(*finding.notes, *notes)) if notes else finding
 
 
 def silence(
-    found: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
+    findings: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
 ) -> tuple[list[Finding], Used]:
     """Return the findings not silenced, and the comments that silenced something.
 
@@ -176,18 +180,21 @@ def silence(
     ``rules`` holds for codes and names a severity, ``off``, or nothing, each with its place; an
     entry that is neither a code nor a name, or cannot be set, is a finding too.
     """
-    unknown = _unknown_rules({name: at for name, (_, at) in rules.items()})
+    unknown = _unknown_rules({name: span for name, (_, span) in rules.items()})
     return apply(
-        [*_with_severities(found, {name: level for name, (level, _) in rules.items()}), *unknown],
+        [
+            *_with_severities(findings, {name: level for name, (level, _) in rules.items()}),
+            *unknown,
+        ],
         allows,
     )
 
 
-def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], Used]:
+def apply(findings: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], Used]:
     """Return the findings that are not allowed, and the used comments with codes."""
     kept: list[Finding] = []
     used: Used = set()
-    for entry in found:
+    for entry in findings:
         allowing = [allow for allow in allows if _covers(allow, entry)]
         if allowing and can_be_allowed(entry.code):
             used.update((allow, entry.code) for allow in allowing)
@@ -196,7 +203,7 @@ def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Findi
     return kept, used
 
 
-def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
+def _with_severities(findings: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
     """Return the findings with the severities that the robot's ``rules`` set.
 
     Those that are ``off`` are left out.
@@ -207,7 +214,7 @@ def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list
         if (code := code_of(name)) and can_be_allowed(code)
     }
     result = []
-    for entry in found:
+    for entry in findings:
         match levels.get(entry.code):
             case "error" | "warning" as severity:
                 result.append(replace(entry, severity=severity))
@@ -218,31 +225,33 @@ def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list
 
 def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     """Return a finding for each entry of ``rules`` that is unknown or cannot be set."""
-    found = []
-    for name, at in rules.items():
+    findings = []
+    for name, span in rules.items():
         code = code_of(name)
         if code is None:
             advice = absent_code(name) or did_you_mean(
                 name, similar_words(name), "write a code that lint prints, such as TF401"
             )
-            found.append(finding("TF017", f"unknown code {name} under rules", at, help=advice))
+            findings.append(
+                finding("TF017", f"unknown code {name} under rules", span, help=advice)
+            )
         elif not can_be_allowed(code):
-            found.append(
+            findings.append(
                 finding(
                     "TF017",
                     f"{code} {CATALOGUE[code].name} cannot be set under rules",
-                    at,
+                    span,
                     help="remove it",
                 )
             )
-    return found
+    return findings
 
 
-def _covers(allow: Allow, found: Finding) -> bool:
-    at = found.span
-    if at is None or at.file != allow.at.file or found.code not in allow.codes:
+def _covers(allow: Allow, finding: Finding) -> bool:
+    span = finding.span
+    if span is None or span.file != allow.span.file or finding.code not in allow.codes:
         return False
-    return allow.line <= at.line <= max(allow.line, allow.last)
+    return allow.line <= span.line <= max(allow.line, allow.last)
 
 
 def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
@@ -250,12 +259,12 @@ def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
 
     Or that cannot allow what it names.
     """
-    found = []
+    findings = []
     for allow in allows:
         if not allow.codes:
-            found.append(
+            findings.append(
                 finding(
-                    "TF012", "allow without a code", allow.at, help="write allow TF401 because …"
+                    "TF012", "allow without a code", allow.span, help="write allow TF401 because …"
                 )
             )
         for code in allow.codes:
@@ -270,44 +279,44 @@ def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
                 advice = "remove it"
                 if code not in CATALOGUE:
                     advice = absent_code(code) or did_you_mean(code, CATALOGUE, advice)
-                found.append(finding("TF012", message, allow.at, help=advice))
+                findings.append(finding("TF012", message, allow.span, help=advice))
         if allow.codes and not allow.reason:
             message = f"allow {', '.join(allow.codes)} without a reason"
-            found.append(finding("TF013", message, allow.at, help="add because … after it"))
-    return found
+            findings.append(finding("TF013", message, allow.span, help="add because … after it"))
+    return findings
 
 
 _OF_AN_ENTRY = 2  # its section and its name
 
 
-def with_replaced(found: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
+def add_replaced_notes(findings: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
     """Return the findings, with notes about the values that theirs replaced."""
     overlaid = [source for source in sources if source.replaced]
     if not overlaid:
-        return list(found)
-    return [replace(finding, notes=_with_notes(finding, overlaid)) for finding in found]
+        return list(findings)
+    return [replace(finding, notes=_with_notes(finding, overlaid)) for finding in findings]
 
 
-def _with_notes(found: Finding, sources: Iterable[Source]) -> tuple[Note, ...]:
-    notes = found.notes
+def _with_notes(finding: Finding, sources: Iterable[Source]) -> tuple[Note, ...]:
+    notes = finding.notes
     for source in sources:
-        notes = (*notes, *_notes(found, {note.span for note in notes}, source))
+        notes = (*notes, *_notes(finding, {note.span for note in notes}, source))
     return notes
 
 
-def _notes(found: Finding, known: set[Span | None], source: Source) -> list[Note]:
+def _notes(finding: Finding, known: set[Span | None], source: Source) -> list[Note]:
     """Return notes about the value at the finding's place.
 
     If none is there, about those of the entry as a whole.
     """
     exact, around = [], []
     for path, (old, *_) in source.replaced.items():
-        now = source.exactly_at(path)
-        if now is None or found.span is None or old in known:
+        now = source.exact_span(path)
+        if now is None or finding.span is None or old in known:
             continue
-        if now.holds(found.span) or found.span == source.at_key(path):
+        if now.holds(finding.span) or finding.span == source.key_span(path):
             exact.append(Note("it replaces this value", old))
-        elif len(path) > _OF_AN_ENTRY and found.span in _places_of_entry(
+        elif len(path) > _OF_AN_ENTRY and finding.span in _places_of_entry(
             path[:_OF_AN_ENTRY], source
         ):
             name = ".".join(map(str, path[_OF_AN_ENTRY:]))
@@ -317,4 +326,4 @@ def _notes(found: Finding, known: set[Span | None], source: Source) -> list[Note
 
 def _places_of_entry(entry: Path, source: Source) -> set[Span]:
     """Return where findings about the whole of an entry are placed: its key, and its parent."""
-    return {source.at_key(entry), source.at((*entry, "parent"))}
+    return {source.key_span(entry), source.span_of((*entry, "parent"))}

@@ -34,7 +34,7 @@ def mimic_without_master(robot: Robot) -> Iterator[Finding]:
                 message = f"{joint.name} mimics {joint.mimic}, which is fixed"
             else:
                 advice = did_you_mean(joint.mimic, sorted(names - {joint.name}), advice)
-            yield finding("TF701", message, joint.mimic_at or joint.at, help=advice)
+            yield finding("TF701", message, joint.mimic_at or joint.span, help=advice)
 
 
 @rule("TF702", of_urdf=True)
@@ -49,12 +49,12 @@ def mimic_loop(robot: Robot) -> Iterator[Finding]:
             name = joints[name].mimic
         if name in path:
             loop = list(path)[list(path).index(name) :]
-            notes = [Note(f"{other} is defined here", joints[other].at) for other in loop[1:]]
+            notes = [Note(f"{other} is defined here", joints[other].span) for other in loop[1:]]
             message = f"joints mimic each other: {' → '.join([*loop, loop[0]])}"
             yield finding(
                 "TF702",
                 message,
-                joints[loop[0]].at,
+                joints[loop[0]].span,
                 notes=notes,
                 help="remove mimic from one of them",
             )
@@ -73,7 +73,7 @@ def joint_without_limits(robot: Robot) -> Iterator[Finding]:
             else []
         )
         lax = joint.limit is not None and robot.is_foreign(
-            joint.at
+            joint.span
         )  # where one end may be missing
         if len(ends) == 2 or (lax and ends):  # noqa: PLR2004 (lower and upper)
             continue
@@ -81,13 +81,13 @@ def joint_without_limits(robot: Robot) -> Iterator[Finding]:
             "lower: -90 deg, upper: 90 deg" if joint.type == "revolute" else "lower: 0, upper: 0.1"
         )
         advice = f"for example limit: {{{usual}}}"
-        if robot.is_foreign(joint.at):
+        if robot.is_foreign(joint.span):
             advice = 'for example <limit lower="-1.57" upper="1.57" effort="10" velocity="1"/>'
         advice += "; a joint without limits is continuous" if joint.type == "revolute" else ""
         message = f"{joint.type} joint {joint.name} has no lower and upper limit"
         severity: Severity = "warning" if lax else "error"
-        at = joint.limit_at or joint.at
-        yield finding("TF704", message, at, help=advice, severity=severity)
+        span = joint.limit_at or joint.span
+        yield finding("TF704", message, span, help=advice, severity=severity)
 
 
 @rule("TF705", of_urdf=True)
@@ -107,8 +107,8 @@ def inverted_limits(robot: Robot) -> Iterator[Finding]:
                 f"{joint.name}: lower {joint.limit.lower:g} {unit} is above upper"
                 f" {joint.limit.upper:g} {unit}"
             )
-            at = joint.limit_at or joint.at
-            yield finding("TF705", message, at, help="swap lower and upper, or check the sign")
+            span = joint.limit_at or joint.span
+            yield finding("TF705", message, span, help="swap lower and upper, or check the sign")
 
 
 @rule("TF706", of_urdf=True)
@@ -126,7 +126,7 @@ def zero_limit(robot: Robot) -> Iterator[Finding]:
             if value is not None and value <= 0:
                 message = f"{joint.name}: {name} limit is {value:g}"
                 advice = f"give the motor's {name}, or remove it"
-                yield finding("TF706", message, joint.limit_at or joint.at, help=advice)
+                yield finding("TF706", message, joint.limit_at or joint.span, help=advice)
 
 
 #: The error of two decimals: [0.71, 0.71, 0] has length 1.004.
@@ -140,8 +140,8 @@ def axis_not_unit(robot: Robot) -> Iterator[Finding]:
         if joint and abs(joint.axis_length - 1) > _AXIS_TOLERANCE:
             axis = ", ".join(f"{part:.4g}" for part in joint.axis)
             message = f"{joint.name}: axis has length {joint.axis_length:.4g}, not 1"
-            at = joint.axis_at or joint.at
-            yield finding("TF707", message, at, help=f"the unit vector is [{axis}]")
+            span = joint.axis_at or joint.span
+            yield finding("TF707", message, span, help=f"the unit vector is [{axis}]")
 
 
 #: No more joints are followed than this.
@@ -165,12 +165,12 @@ def mimic_chain(robot: Robot) -> Iterator[Finding]:
         offset = joint.multiplier * middle.offset + joint.offset
         end = f", offset: {offset:g}" if offset else ""
         message = f"{joint.name} mimics {middle.name}, which mimics {middle.mimic}"
-        notes = [Note(f"{middle.name} is defined here", middle.at)]
+        notes = [Note(f"{middle.name} is defined here", middle.span)]
         advice = f"write mimic: {{joint: {middle.mimic}, multiplier: {multiplier:g}{end}}}"
-        if robot.is_foreign(joint.at):
+        if robot.is_foreign(joint.span):
             end = f' offset="{offset:g}"' if offset else ""
             advice = f'write <mimic joint="{middle.mimic}" multiplier="{multiplier:g}"{end}/>'
-        yield finding("TF708", message, joint.at, help=advice, notes=notes)
+        yield finding("TF708", message, joint.span, help=advice, notes=notes)
 
 
 def _loops(joints: dict[str, Joint], name: str) -> bool:
@@ -192,11 +192,11 @@ def joint_without_owner(robot: Robot) -> Iterator[Finding]:
                 f" {edge.child}"
             )
             advice = "add owner: the process that publishes the edge"
-            if robot.is_foreign(joint.at):  # URDF has no owners
+            if robot.is_foreign(joint.span):  # URDF has no owners
                 advice = (
                     "convert the file with tfcompose import, and give the joint an owner there"
                 )
-            yield finding("TF715", message, edge.owner_at or joint.at, help=advice)
+            yield finding("TF715", message, edge.owner_at or joint.span, help=advice)
 
 
 #: Soft limits half a turn outside of both limits are switched off.
@@ -218,7 +218,7 @@ def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
         if joint.type != "continuous" and not (inside and low < high):
             message = f"{joint.name}: soft limits {low:g} to {high:g} are not within its limits"
             advice = "set soft_lower_limit and soft_upper_limit to values between lower and upper"
-            yield finding("TF716", message, joint.at, help=advice)
+            yield finding("TF716", message, joint.span, help=advice)
 
 
 @rule("TF717", of_urdf=True)
@@ -229,17 +229,17 @@ def interface_claimed_twice(robot: Robot) -> Iterator[Finding]:
             for way, interfaces in (("command", component.command), ("state", component.state)):
                 for interface in interfaces:
                     claim = (component.name, way, interface.name)
-                    other, at = first.setdefault(claim, (hardware.name, component.at))
-                    if at != component.at:
+                    other, span = first.setdefault(claim, (hardware.name, component.span))
+                    if span != component.span:
                         message = (
                             f"{hardware.name} and {other} both have the {way} interface"
                             f" {claim[0]}/{claim[2]}"
                         )
-                        notes = [Note(f"{other} has it here", at)]
+                        notes = [Note(f"{other} has it here", span)]
                         yield finding(
                             "TF717",
                             message,
-                            component.at,
+                            component.span,
                             help="remove it from one of them",
                             notes=notes,
                         )
@@ -260,11 +260,11 @@ def mimic_joint_commanded(robot: Robot) -> Iterator[Finding]:
                 message = (
                     f"{joint.name} mimics {joint.mimic}, but {hardware.name} commands its {names}"
                 )
-                notes = [Note(f"{joint.name} is defined here", joint.at)]
+                notes = [Note(f"{joint.name} is defined here", joint.span)]
                 yield finding(
                     "TF718",
                     message,
-                    component.at,
+                    component.span,
                     help="keep only its state interfaces",
                     notes=notes,
                 )
@@ -276,7 +276,7 @@ _MOST_LISTED = 5
 @rule("TF728", of_urdf=True)
 def joint_named_like_a_frame(robot: Robot) -> Iterator[Finding]:
     named = {
-        edge.joint_name: edge.joint_at or edge.at
+        edge.joint_name: edge.joint_at or edge.span
         for edge in robot.edges
         if edge.joint_name in robot.frames
     }
@@ -305,7 +305,7 @@ def negative_damping(robot: Robot) -> Iterator[Finding]:
         ):
             if value < 0:
                 message = f"{joint.name}: {name} is {value:g}"
-                yield finding("TF731", message, joint.at, help="give 0 or more, or remove it")
+                yield finding("TF731", message, joint.span, help="give 0 or more, or remove it")
 
 
 #: What a joint does about its axis, of those that do not turn.
@@ -321,9 +321,9 @@ def joint_without_axis(robot: Robot) -> Iterator[Finding]:
         about = _ABOUT.get(joint.type, "turns about")
         message = f"{joint.type} joint {joint.name} has no axis, and so {about} x"
         advice = "write axis: [1, 0, 0] if x is right, else for example [0, 0, 1]"
-        if robot.is_foreign(joint.at):
+        if robot.is_foreign(joint.span):
             advice = 'write <axis xyz="1 0 0"/> if x is right, else for example "0 0 1"'
-        yield finding("TF736", message, joint.at, help=advice)
+        yield finding("TF736", message, joint.span, help=advice)
 
 
 #: A revolute finger or slide that moves by less, in rad, has its limits in metres.
@@ -346,8 +346,8 @@ def limits_of_another_type(robot: Robot) -> Iterator[Finding]:
         low, high = joint.limit.lower, joint.limit.upper
         if low is None or high is None or low >= high:
             continue
-        at, span = joint.limit_at or joint.at, high - low
-        foreign = robot.is_foreign(joint.at)
+        at, span = joint.limit_at or joint.span, high - low
+        foreign = robot.is_foreign(joint.span)
         if (
             joint.type == "revolute"
             and span < _LEAST_REVOLUTE_RAD
@@ -394,8 +394,8 @@ def fingers_move_alike(robot: Robot) -> Iterator[Finding]:
         if is_same_place:
             message += ", and from the same place"
         advice = "change the sign of the axis, or of the multiplier, of one of them"
-        notes = [Note(f"{twin.joint.name} is defined here", twin.joint.at)]
-        yield finding("TF735", message, joint.axis_at or joint.at, help=advice, notes=notes)
+        notes = [Note(f"{twin.joint.name} is defined here", twin.joint.span)]
+        yield finding("TF735", message, joint.axis_at or joint.span, help=advice, notes=notes)
 
 
 def _opening(edge: Edge) -> Vector:
@@ -437,4 +437,4 @@ def position_outside_limits(robot: Robot) -> Iterator[Finding]:
                         f" limits, {limits}"
                     )
                     advice = "correct initial_value, or the limits"
-                    yield finding("TF737", message, component.at, help=advice)
+                    yield finding("TF737", message, component.span, help=advice)

@@ -29,31 +29,31 @@ _NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 def bad_frame_name(robot: Robot) -> Iterator[Finding]:
     names: dict[str, Span] = dict(robot.frames)
     for edge in robot.edges:
-        names.setdefault(edge.child, edge.child_at or edge.at)
+        names.setdefault(edge.child, edge.child_at or edge.span)
         if edge.joint_name:
-            names.setdefault(edge.joint_name, edge.joint_at or edge.at)
+            names.setdefault(edge.joint_name, edge.joint_at or edge.span)
     moving = {edge.joint_name for edge in robot.edges if edge.joint}
-    for name, at in names.items():
+    for name, span in names.items():
         if not _GOOD.fullmatch(name):
-            is_foreign = robot.is_foreign(at)
+            is_foreign = robot.is_foreign(span)
             is_accepted = bool(re.fullmatch(_TAKEN, name))
             if is_accepted and is_foreign and name not in moving and name not in robot.frames:
                 continue  # nothing is named after a fixed joint
             is_accepted = is_accepted or (is_foreign and not re.fullmatch(_LOST, name))
-            yield _invalid(name, at, "name", "warning" if is_accepted else "error")
+            yield _invalid(name, span, "name", "warning" if is_accepted else "error")
     for process in robot.processes:
         if not _PROCESS.fullmatch(process.name):
-            yield _invalid(process.name, process.at, "process name")
+            yield _invalid(process.name, process.span, "process name")
         elif process.name == _LAUNCHER:
             message = (
                 f"a process cannot be called {_LAUNCHER}: logs and findings use that name for the"
                 " launcher"
             )
-            yield finding("TF501", message, process.at, help="give the process another name")
+            yield finding("TF501", message, process.span, help="give the process another name")
         elif (process.package or process.kind != "run" or process.params) and not _NODE.fullmatch(
             process.node
         ):
-            yield _invalid(process.node, process.at, "node name")
+            yield _invalid(process.node, process.span, "node name")
 
 
 def valid_name(name: str) -> str:
@@ -62,13 +62,13 @@ def valid_name(name: str) -> str:
     return better if _GOOD.fullmatch(better) else ""
 
 
-def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Finding:
+def _invalid(name: str, span: Span, what: str, severity: Severity = "error") -> Finding:
     bare = name.lstrip("/")
     if what == "name" and bare != name and _GOOD.fullmatch(bare):
         return finding(
             "TF501",
             f"invalid {what} {name!r}",
-            at,
+            span,
             help=f"write {bare}: tf2 drops a leading slash",
         )
     better = valid_name(name)
@@ -76,7 +76,7 @@ def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Fi
     message = f"invalid {what} {name!r}"
     if severity == "warning":
         message = f"{what} {name!r} has characters that no parameter or topic can have"
-    return finding("TF501", message, at, help=advice, severity=severity)
+    return finding("TF501", message, span, help=advice, severity=severity)
 
 
 _ALLOWED = "use letters, digits and _; a node's name does not begin with a digit"
@@ -87,11 +87,11 @@ def upper_case_name(robot: Robot) -> Iterator[Finding]:
     presets = [sensor for sensor in robot.sensors if sensor.name == sensor.name.lower()]
     inside = {frame for sensor in presets for frame in (sensor.mount, *sensor.frames)}
     bad = {
-        name: at
-        for name, at in robot.frames.items()
+        name: span
+        for name, span in robot.frames.items()
         if name != name.lower()
         and name not in inside
-        and (name.lower() in robot.frames or not robot.is_foreign(at))
+        and (name.lower() in robot.frames or not robot.is_foreign(span))
     }
     if bad:
         first, *others = bad
@@ -99,8 +99,8 @@ def upper_case_name(robot: Robot) -> Iterator[Finding]:
         more = f" and {len(others)} more" if others else ""
         message = f"upper case letters in frame name {first}{more}"
         notes = [
-            Note(f"{name} and {lower} are two frames", at)
-            for name, at in bad.items()
+            Note(f"{name} and {lower} are two frames", span)
+            for name, span in bad.items()
             if (lower := known.get(name.lower()))
         ]
         notes += [Note(f"also in {name}", bad[name]) for name in others[:_MOST_LISTED]]
@@ -117,14 +117,14 @@ def _lower_case(name: str) -> str:
 
 @rule("TF504", idle=True)
 def unused_variable(robot: Robot) -> Iterator[Finding]:
-    for (section, name), at in robot.unused.items():
-        if at.file == robot.file and (section, name) not in robot.broken:
+    for (section, name), span in robot.unused.items():
+        if span.file == robot.file and (section, name) not in robot.broken:
             what, expression = (
                 ("argument", f"args.{name}") if section == "args" else ("variable", name)
             )
             yield finding(
                 "TF504",
                 f"unused {what} {name}",
-                at,
+                span,
                 help=f'use it, "${{{expression}}}", or remove it',
             )

@@ -72,7 +72,7 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
                 ),
                 (),
             )
-        yield finding("TF401", message, edge.at, help=advice, edits=edits)
+        yield finding("TF401", message, edge.span, help=advice, edits=edits)
 
 
 @rule("TF416", of_urdf=True, follows="pose")
@@ -84,7 +84,7 @@ def camera_upside_down(robot: Robot) -> Iterator[Finding]:
                 f"an optical frame has {_optical_rotation(edge, robot)}; if the camera hangs"
                 " upside down, turn its body frame by 180 deg about x"
             )
-            yield finding("TF416", message, edge.at, help=advice)
+            yield finding("TF416", message, edge.span, help=advice)
 
 
 def _edges_turned_otherwise(robot: Robot) -> Iterator[Edge]:
@@ -116,7 +116,7 @@ def _is_upside_down(edge: Edge, robot: Robot) -> bool:
 
 
 def _optical_rotation(edge: Edge, robot: Robot) -> str:
-    if robot.is_foreign(edge.at):
+    if robot.is_foreign(edge.span):
         return '<origin rpy="-1.5707963267948966 0 -1.5707963267948966"/>'
     return "rpy: [-90 deg, 0, -90 deg]"
 
@@ -206,4 +206,4 @@ def camera_without_optical_frame(robot: Robot) -> Iterator[Finding]:
         if not by_other_names and not any(is_optical(frame) for frame in below):
             message = f"camera {sensor.name} has no optical frame"
             advice = f"add a frame {sensor.name}_optical_frame with rpy: [-90 deg, 0, -90 deg]"
-            yield finding("TF620", message, sensor.at, help=advice)
+            yield finding("TF620", message, sensor.span, help=advice)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.text import with_more
-from tfcompose.model.robot import BUILT_IN, left_out_by
+from tfcompose.model.robot import BUILT_IN, advise_left_out
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,12 +23,12 @@ def edge_with_two_owners(robot: Robot) -> Iterator[Finding]:
         other = first.setdefault((edge.parent, edge.child), edge)
         if other.owner != edge.owner:
             message = f"edge {edge.name} has two owners: {other.owner} and {edge.owner}"
-            notes = [Note(f"{other.owner} owns it here", other.owner_at or other.at)]
-            place = edge.owner_at or edge.at
+            notes = [Note(f"{other.owner} owns it here", other.owner_at or other.span)]
+            span = edge.owner_at or edge.span
             yield finding(
                 "TF301",
                 message,
-                place,
+                span,
                 notes=notes,
                 help="remove one of the two edges, or its owner",
             )
@@ -46,8 +46,8 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
     ] = {}  # a part's owner owns many edges, and is one typo
     for edge in robot.edges:
         if edge.owner not in names and not robot.excuses(edge.owner):
-            lost.setdefault((edge.owner, edge.owner_at or edge.at), []).append(edge)
-    for (owner, at), edges in lost.items():
+            lost.setdefault((edge.owner, edge.owner_at or edge.span), []).append(edge)
+    for (owner, span), edges in lost.items():
         declare = (
             f"declare it: processes: {{{owner}: {{external: true}}}}, if it is started elsewhere"
         )
@@ -63,8 +63,8 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
         declare = f"did you mean {runs}, the process that runs this node?" if runs else declare
         if owner in STOCK:
             declare = "leave owner out: tfcompose publishes fixed frames and joints itself"
-        advice = left_out_by(robot.conditions, owner) or did_you_mean(owner, names, declare)
-        yield finding("TF302", message, at, help=advice)
+        advice = advise_left_out(robot.conditions, owner) or did_you_mean(owner, names, declare)
+        yield finding("TF302", message, span, help=advice)
 
 
 @rule("TF303")
@@ -86,7 +86,7 @@ def owner_cannot_publish(robot: Robot) -> Iterator[Finding]:
         if reason:
             message = f"{edge.owner} cannot publish {edge.name}: {reason}"
             advice = "remove owner, or name the process that publishes the edge"
-            yield finding("TF303", message, edge.owner_at or edge.at, help=advice)
+            yield finding("TF303", message, edge.owner_at or edge.span, help=advice)
 
 
 @rule("TF305")
@@ -102,7 +102,7 @@ def static_edge_with_rate(robot: Robot) -> Iterator[Finding]:
                 if edge.owner_at
                 else "remove rate, or add the owner that publishes the edge"
             )
-            yield finding("TF305", message, edge.rate_at or edge.at, help=advice)
+            yield finding("TF305", message, edge.rate_at or edge.span, help=advice)
 
 
 @rule("TF306")
@@ -119,9 +119,11 @@ def one_node_two_levels(robot: Robot) -> Iterator[Finding]:
             other = upper.get(edge.parent)
             if other and other.owner == edge.owner:
                 message = f"{edge.owner} publishes both {other.name} and {edge.name}"
-                notes = [Note(f"{other.name} is defined here", other.owner_at or other.at)]
+                notes = [Note(f"{other.name} is defined here", other.owner_at or other.span)]
                 advice = "use one process for localisation and another for odometry"
-                yield finding("TF306", message, edge.owner_at or edge.at, help=advice, notes=notes)
+                yield finding(
+                    "TF306", message, edge.owner_at or edge.span, help=advice, notes=notes
+                )
 
 
 @rule("TF336")
@@ -135,9 +137,9 @@ def slower_than_declared(robot: Robot) -> Iterator[Finding]:
         if edge.is_slower(rate):
             message = f"{process.name} is simulated at {rate:g} Hz, but {edge.name} is declared"
             message += f" with {edge.rate:g} Hz"
-            notes = [Note("declared here", edge.rate_at or edge.at)]
+            notes = [Note("declared here", edge.rate_at or edge.span)]
             advice = "remove rate under simulate: the declared rate is its default"
-            yield finding("TF336", message, process.at, help=advice, notes=notes)
+            yield finding("TF336", message, process.span, help=advice, notes=notes)
 
 
 def _is_edge(edge: Edge, parent: str, children: set[str]) -> bool:
@@ -163,7 +165,7 @@ def rate_too_low(robot: Robot) -> Iterator[Finding]:
                 continue
             message = f"{edge.name} has a rate of {edge.rate:g} Hz; it needs at least {least:g} Hz"
             advice = f"raise the rate of {edge.owner}, then the one declared here"
-            yield finding("TF307", message, edge.rate_at or edge.at, help=advice)
+            yield finding("TF307", message, edge.rate_at or edge.span, help=advice)
 
 
 @rule("TF308")
@@ -225,9 +227,11 @@ def _publishes_too(
     switch = ", ".join(f"{key}: {str(value).lower()}" for key, value in off.items())
     advice = f"start {process.name} with the parameter {switch}{instead}"
     notes = (
-        [Note(f"{process.name} is declared here", process.at)] if process.at != sensor.at else []
+        [Note(f"{process.name} is declared here", process.span)]
+        if process.span != sensor.span
+        else []
     )
-    return finding("TF308", message, sensor.tf_at or sensor.at, help=advice, notes=notes)
+    return finding("TF308", message, sensor.tf_at or sensor.span, help=advice, notes=notes)
 
 
 _MOST_STATIC_PUBLISHERS = 50
@@ -239,9 +243,9 @@ def many_static_publishers(robot: Robot) -> Iterator[Finding]:
     if len(first) > _MOST_STATIC_PUBLISHERS:
         listed = sorted(first)
         message = f"{len(first)} processes publish fixed edges: {', '.join(listed[:3])}, …"
-        last = max(first.values(), key=lambda edge: (edge.at.line, edge.at.column))
+        last = max(first.values(), key=lambda edge: (edge.span.line, edge.span.column))
         advice = "let tfcompose publish them: remove owner, and set tf: tfcompose on sensors"
-        yield finding("TF309", message, last.owner_at or last.at, help=advice)
+        yield finding("TF309", message, last.owner_at or last.span, help=advice)
 
 
 @rule("TF310")
@@ -254,7 +258,7 @@ def switched_edge_without_owner(robot: Robot) -> Iterator[Finding]:
                 " them"
             )
             advice = "name the process that publishes the edge, owner: …, or keep one parent"
-            yield finding("TF310", message, edge.at, help=advice)
+            yield finding("TF310", message, edge.span, help=advice)
 
 
 @rule("TF311")
@@ -269,7 +273,7 @@ def switched_edge_static(robot: Robot) -> Iterator[Finding]:
             yield finding(
                 "TF311",
                 message,
-                edge.at,
+                edge.span,
                 help="publish it on /tf: give it a rate, and remove static: true",
             )
 
@@ -285,17 +289,17 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
         if most is None:
             continue
         wanted = [
-            (edge.rate or 0.0, f"{edge.name} needs", edge.rate_at or edge.at)
+            (edge.rate or 0.0, f"{edge.name} needs", edge.rate_at or edge.span)
             for edge in robot.edges
             if edge.joint and edge.owner == process.name
         ]
         if wanted:
             wanted += [
-                (process.simulate.rate, f"{process.name} sends", process.at)
+                (process.simulate.rate, f"{process.name} sends", process.span)
                 for process in robot.processes
                 if process.simulate and process.simulate.kind == "joints"
             ]
-        rate, what, at = max(wanted, default=(0.0, "", process.at), key=lambda each: each[0])
+        rate, what, span = max(wanted, default=(0.0, "", process.span), key=lambda each: each[0])
         if rate > most:
             message = (
                 f"{process.name} publishes joint states with at most {most:g} Hz, but {what}"
@@ -308,9 +312,11 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
                     " state"
                 )
             notes = (
-                (Note(f"{process.name} is defined here", process.at),) if at != process.at else ()
+                (Note(f"{process.name} is defined here", process.span),)
+                if span != process.span
+                else ()
             )
-            yield finding("TF314", message, at, notes=notes, help=advice)
+            yield finding("TF314", message, span, notes=notes, help=advice)
 
 
 def _most_hz(process: Process) -> float | None:
@@ -340,7 +346,7 @@ def parameters_of_another_node(robot: Robot) -> Iterator[Finding]:
                         "write params: {NAME: VALUE, …} without the node's name, or params:"
                         " {file: …}"
                     )
-                    yield finding("TF334", message, node.at, help=advice)
+                    yield finding("TF334", message, node.span, help=advice)
 
 
 _TRUE = frozenset({"true", "yes", "on", "y"})
@@ -358,8 +364,8 @@ def clocks_mixed(robot: Robot) -> Iterator[Finding]:
                 f"{node.name} has use_sim_time: {str(value).lower()}, but the robot's clock is"
                 f" {robot.ros.clock}"
             )
-            at, *inside = node.places.get("use_sim_time", (node.at,))
-            notes = [Note("it is set here", place) for place in inside]
+            at, *inside = node.places.get("use_sim_time", (node.span,))
+            notes = [Note("it is set here", span) for span in inside]
             way_out = f"write use_sim_time: {str(sim).lower()} beside file: it takes precedence"
             way_out = way_out if inside else "remove use_sim_time"
             advice = f"{way_out}; or set ros: {{clock: {'wall' if sim else 'sim'}}}"

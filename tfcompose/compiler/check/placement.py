@@ -107,11 +107,11 @@ def sensor_inside_body(robot: Robot) -> Iterator[Finding]:
                 )
                 message += f"; the limit is {100 * limit:g} cm"
                 advice = f"correct the pose, or give {link} a shape with an opening"
-                yield finding("TF640", message, sensor.at, help=advice, notes=_at(robot, link))
+                yield finding("TF640", message, sensor.span, help=advice, notes=_at(robot, link))
 
 
 def _at(robot: Robot, link: str) -> list[Note]:
-    return [Note(f"{link} is defined here", robot.links[link].at)]
+    return [Note(f"{link} is defined here", robot.links[link].span)]
 
 
 @rule("TF641")
@@ -132,7 +132,7 @@ def view_blocked(robot: Robot) -> Iterator[Finding]:
             message += f"{_some(worst.blocking)}; the limit is {_percent(limit)}"
             advice = "move or turn the sensor, or raise the limit under rules"
             yield finding(
-                "TF641", message, sensor.at, help=advice, notes=_at(robot, worst.blocking[0])
+                "TF641", message, sensor.span, help=advice, notes=_at(robot, worst.blocking[0])
             )
 
 
@@ -154,7 +154,7 @@ def blind_sector(robot: Robot) -> Iterator[Finding]:
                 )
                 advice = "move the scanner, or raise the limit under rules"
                 yield finding(
-                    "TF642", message, sensor.at, help=advice, notes=_at(robot, view.blocking[0])
+                    "TF642", message, sensor.span, help=advice, notes=_at(robot, view.blocking[0])
                 )
 
 
@@ -201,7 +201,7 @@ def camera_sees_only_robot(robot: Robot) -> Iterator[Finding]:
                 )
                 advice = "correct the pose: x of the body frame points where it looks"
                 yield finding(
-                    "TF643", message, sensor.at, help=advice, notes=_at(robot, view.blocking[0])
+                    "TF643", message, sensor.span, help=advice, notes=_at(robot, view.blocking[0])
                 )
                 break
 
@@ -227,7 +227,7 @@ def camera_sees_only_floor(robot: Robot) -> Iterator[Finding]:
                 )
                 advice = "correct the pose: a positive pitch looks down"
                 yield finding(
-                    "TF644", f"{message}; the limit is {limit:g} m", sensor.at, help=advice
+                    "TF644", f"{message}; the limit is {limit:g} m", sensor.span, help=advice
                 )
                 break
 
@@ -304,9 +304,9 @@ def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
                 f"{sensor_a.name} and {other.name} look into each other, {far:.2g} m apart; the"
                 f" limit is {limit:g} m"
             )
-            notes = [Note(f"{sensor_a.name} is defined here", sensor_a.at)]
+            notes = [Note(f"{sensor_a.name} is defined here", sensor_a.span)]
             advice = "turn one away, or mount them at different heights"
-            yield finding("TF645", message, other.at, help=advice, notes=notes)
+            yield finding("TF645", message, other.span, help=advice, notes=notes)
 
 
 def _is_light(optics: Optics) -> bool:
@@ -351,7 +351,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
                 yield finding(
                     "TF646",
                     f"the zone {zone.name}: unknown frame {zone.frame}",
-                    zone.at,
+                    zone.span,
                     help=advice,
                 )
             continue
@@ -360,7 +360,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
         if wrong:
             advice = did_you_mean(wrong[0], [*KINDS, *names])
             yield finding(
-                "TF646", f"the zone {zone.name}: unknown sensor {wrong[0]}", zone.at, help=advice
+                "TF646", f"the zone {zone.name}: unknown sensor {wrong[0]}", zone.span, help=advice
             )
             continue
         part, unknown = _coverage_of(robot, zone)
@@ -378,7 +378,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
             yield finding(
                 "TF646",
                 message,
-                zone.at,
+                zone.span,
                 help=advice or "move or add a sensor, or make the zone smaller",
             )
 

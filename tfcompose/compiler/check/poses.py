@@ -78,11 +78,13 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
                 f"{value.entry}: {value.key} is {number:g} rad{per_s},"
                 f" {number / math.tau:.3g} turns{per_s}"
             )
-            at = value.place(index)
+            span = value.locate(index)
             advice_value = f"{number:g} deg{per_s}"
-            if robot.is_foreign(at):
+            if robot.is_foreign(span):
                 advice_value = f"{math.radians(number):.17g}"
-            yield finding("TF410", message, at, help=f"if degrees are meant, write {advice_value}")
+            yield finding(
+                "TF410", message, span, help=f"if degrees are meant, write {advice_value}"
+            )
 
 
 def _is_in_degrees(key: str, step: str | int, size: float) -> bool:
@@ -117,11 +119,11 @@ def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
             message = (
                 f"{value.entry}: {value.key} has {listed}, {off:.2g} deg off {quarters * 90} deg"
             )
-            at = value.place(first)
+            span = value.locate(first)
             advice = f'write {quarters * 90} deg, or "${{{sign}{_QUARTERS[abs(quarters)]}}}"'
-            if robot.is_foreign(at):
+            if robot.is_foreign(span):
                 advice = f"write {quarters * math.pi / 2!r}"
-            yield finding("TF411", message, at, help=advice)
+            yield finding("TF411", message, span, help=advice)
 
 
 def _is_rounded(number: float) -> bool:
@@ -162,7 +164,7 @@ def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
             advice = f"if w is first, write {_list_numbers((second, third, fourth, first))}"
             if identity:
                 advice += "; if the half turn is meant, rpy: [180 deg, 0, 0]"
-            yield finding("TF412", message, value.place(0), help=advice)
+            yield finding("TF412", message, value.locate(0), help=advice)
 
 
 def _degrees(w: float) -> str:
@@ -205,7 +207,7 @@ _OVERHEAD_M = 1.5
 @rule("TF413", follows="pose")
 def camera_looks_away(robot: Robot) -> Iterator[Finding]:
     base = (robot.base or "").rpartition("/")[2]
-    poses = placed(robot) if base.startswith("base") and robot.sensors else {}
+    poses = poses_in_base(robot) if base.startswith("base") and robot.sensors else {}
     for sensor in robot.sensors:
         view = next(
             (_VIEWS[token] for token in reversed(sensor.name.split("_")) if token in _VIEWS), None
@@ -235,11 +237,11 @@ def camera_looks_away(robot: Robot) -> Iterator[Finding]:
 def _rotation_at(robot: Robot, sensor: MountedSensor) -> Span:
     """Return the place of the rotation of a sensor's mount, or of the sensor without one."""
     places = (
-        value.place(0)
+        value.locate(0)
         for value in robot.source_numbers
         if value.path[:-1] == ("sensors", sensor.name) and value.key != "xyz"
     )
-    return next(places, sensor.at)
+    return next(places, sensor.span)
 
 
 _ROUNDING_RAD = 1e-6
@@ -260,7 +262,7 @@ def tilted_past_vertical(robot: Robot) -> Iterator[Finding]:
                 "it looks back, upside down; if it is to be upright, write left: 180 deg and at"
                 f" most 90 deg {step}"
             )
-            yield finding("TF415", message, value.place(index), help=advice)
+            yield finding("TF415", message, value.locate(index), help=advice)
 
 
 #: No part of an ordinary robot is farther from its mount; larger robots are known by their bodies
@@ -280,15 +282,15 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         if largest > _LARGEST_M:
             message = f"the body of {link.name} is {largest:g} m long"
             advice_value = (
-                f"{largest / 1000:g}" if robot.is_foreign(link.at) else f"{largest:g} mm"
+                f"{largest / 1000:g}" if robot.is_foreign(link.span) else f"{largest:g} mm"
             )
             yield finding(
-                "TF414", message, link.at, help=f"if millimetres are meant, write {advice_value}"
+                "TF414", message, link.span, help=f"if millimetres are meant, write {advice_value}"
             )
     body = max(
         (size for extent in sizes.values() for size in extent if size <= _LARGEST_M), default=0.0
     )
-    below = placed(robot, moving=True)
+    below = poses_in_base(robot, moving=True)
     mounts = [
         norm(edge.pose.xyz)
         for edge in robot.edges
@@ -303,7 +305,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         if inertial and (distance := norm(inertial.pose.xyz)) > limit:
             message = f"the centre of mass of {link.name} is {distance:g} m away from it"
             advice = "check its unit: a bare number is in metres"
-            yield finding("TF414", message, inertial.at or link.at, help=advice)
+            yield finding("TF414", message, inertial.span or link.span, help=advice)
     near = sorted(distance for distance in mounts if distance <= limit)
     usual = near[len(near) // 2] if near else 0.0
     moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
@@ -330,14 +332,14 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
                 f" {limit:.3g} m"
             )
             farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
-            at, number = value.place(farthest), value.numbers[farthest]
+            span, number = value.locate(farthest), value.numbers[farthest]
             unit, divisor = _unit_meant(distance, usual)
             advice_value = f"{number / divisor:g}"
-            if not robot.is_foreign(at):
+            if not robot.is_foreign(span):
                 advice_value = f"{number:g} {unit}"
             name = "centimetres" if unit == "cm" else "millimetres"
             advice = f"a bare number is in metres; if {name} are meant, write {advice_value}"
-            yield finding("TF414", message, at, help=advice)
+            yield finding("TF414", message, span, help=advice)
 
 
 def _unit_meant(distance: float, usual: float) -> tuple[str, float]:
@@ -378,9 +380,9 @@ def _meshes_in_other_units(robot: Robot) -> Iterator[Finding]:
         for shape in (*link.visuals, *link.collisions):
             mesh = shape.mesh
             size = size_of(shape) if mesh else None
-            if mesh is None or size is None or mesh.at in done:
+            if mesh is None or size is None or mesh.span in done:
                 continue
-            done.add(mesh.at)
+            done.add(mesh.span)
             largest, scale = max(size), max(map(abs, shape.size))
             is_small = 0 < largest < (_SMALL_MESH_M if scale < 1 else _TINY_MESH_M)
             is_mark = scale >= 1 and min(size) > _CUBE * largest
@@ -394,10 +396,10 @@ def _meshes_in_other_units(robot: Robot) -> Iterator[Finding]:
                 why = "was scaled down already"
             right = " ".join(f"{abs(part) * factor:g}" for part in shape.size)
             advice = f'scale="{right}"'
-            if not robot.is_foreign(mesh.at):
+            if not robot.is_foreign(mesh.span):
                 advice = f"scale: [{right.replace(' ', ', ')}]"
             message = f"the mesh of {link.name} is {largest:.3g} m long at its scale of {scale:g}"
-            yield finding("TF414", message, mesh.at, help=f"if the file {why}, write {advice}")
+            yield finding("TF414", message, mesh.span, help=f"if the file {why}, write {advice}")
 
 
 #: The least and the greatest x, y, z.
@@ -434,7 +436,7 @@ _MIDDLE_M = 0.01
 _MIRRORED_M = 0.001
 
 
-def placed(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
+def poses_in_base(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
     """Return the pose in the robot's base of each frame fixed to it.
 
     ``moving``: also through joints, at zero.

@@ -79,4 +79,4 @@ def _without_prefix(process: Process, names: dict[str, str], robot: Robot) -> Fi
         f"{process.name} looks frames up without the prefix {robot.ros.frame_prefix}: {listed}"
     )
     wanted = ", ".join(f'{key}: "${{frame({value})}}"' for key, value in names.items())
-    return finding("TF318", message, process.at, help=f"params: {{{wanted}}}")
+    return finding("TF318", message, process.span, help=f"params: {{{wanted}}}")

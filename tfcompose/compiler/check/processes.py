@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.units import UNITS
-from tfcompose.model.robot import left_out_by
+from tfcompose.model.robot import advise_left_out
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,12 +33,12 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
             del waiting[name]
     names = list(waiting)
     if names:
-        notes = [Note(f"{name} is defined here", waiting[name].at) for name in names[1:]]
+        notes = [Note(f"{name} is defined here", waiting[name].span) for name in names[1:]]
         message = f"processes wait for each other: {', '.join(names)}"
         yield finding(
             "TF812",
             message,
-            waiting[names[0]].at,
+            waiting[names[0]].span,
             notes=notes,
             help="remove one of their after entries",
         )
@@ -86,7 +86,9 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
         )
         if process.simulate and process.simulate.kind == "joints":
             reason, advice = "no joint moves", "remove it"
-        yield finding("TF815", f"unused process {process.name}: {reason}", process.at, help=advice)
+        yield finding(
+            "TF815", f"unused process {process.name}: {reason}", process.span, help=advice
+        )
 
 
 @rule("TF818")
@@ -99,7 +101,7 @@ def required_without_role(robot: Robot) -> Iterator[Finding]:
                 f"remove required, or write after: {{{process.name}: ready}} on the process that"
                 " needs it"
             )
-            yield finding("TF818", message, process.at, help=advice)
+            yield finding("TF818", message, process.span, help=advice)
 
 
 @rule("TF847")
@@ -112,8 +114,8 @@ def needed_but_optional(robot: Robot) -> Iterator[Finding]:
             if name in optional:
                 message = f"{process.name} waits until {name} is {what}, but {name} is optional"
                 advice = f"write required: false on {process.name} too, or remove it from {name}"
-                notes = [Note(f"{name} is defined here", optional[name].at)]
-                yield finding("TF847", message, process.at, notes=notes, help=advice)
+                notes = [Note(f"{name} is defined here", optional[name].span)]
+                yield finding("TF847", message, process.span, notes=notes, help=advice)
 
 
 @rule("TF848")
@@ -126,7 +128,7 @@ def gate_never_opens(robot: Robot) -> Iterator[Finding]:
             yield finding(
                 "TF848",
                 message,
-                process.at,
+                process.span,
                 help="remove ready, or wait for a topic or a line of output",
             )
         elif kind == "exit" and process.restart == "always":
@@ -134,7 +136,7 @@ def gate_never_opens(robot: Robot) -> Iterator[Finding]:
                 f"{process.name} is ready when it has ended, but restart: always starts it again"
             )
             yield finding(
-                "TF848", message, process.at, help="write restart: on-failure, or remove restart"
+                "TF848", message, process.span, help="write restart: on-failure, or remove restart"
             )
 
 
@@ -153,9 +155,13 @@ def component_elsewhere(robot: Robot) -> Iterator[Finding]:
                     f"{process.name} is on {process.host}, and its container {container.name}"
                     " names no host"
                 )
-            notes = [Note(f"{container.name} is defined here", container.at)]
+            notes = [Note(f"{container.name} is defined here", container.span)]
             yield finding(
-                "TF855", message, process.at, notes=notes, help=f"remove host from {process.name}"
+                "TF855",
+                message,
+                process.span,
+                notes=notes,
+                help=f"remove host from {process.name}",
             )
 
 
@@ -169,7 +175,10 @@ def container_without_components(robot: Robot) -> Iterator[Finding]:
                 " remove it"
             )
             yield finding(
-                "TF856", f"the container {process.name} has no components", process.at, help=advice
+                "TF856",
+                f"the container {process.name} has no components",
+                process.span,
+                help=advice,
             )
 
 
@@ -185,7 +194,7 @@ def host_not_declared(robot: Robot) -> Iterator[Finding]:
         ):
             continue
         otherwise = (
-            left_out_by(robot.conditions, name) or f"hosts: {{{name}: {{ssh: user@address}}}}"
+            advise_left_out(robot.conditions, name) or f"hosts: {{{name}: {{ssh: user@address}}}}"
         )
         advice = did_you_mean(name, robot.hosts, otherwise)
         message = f"{process.name} is on {name}, which is not among hosts"
@@ -201,7 +210,7 @@ def host_without_processes(robot: Robot) -> Iterator[Finding]:
                 f"processes: {{static: {{host: {name}}}}} runs every process without a host there,"
                 " or remove it"
             )
-            yield finding("TF858", f"no process runs on the host {name}", host.at, help=advice)
+            yield finding("TF858", f"no process runs on the host {name}", host.span, help=advice)
 
 
 #: A number, a space and what may be a unit.
@@ -215,10 +224,10 @@ def parameter_with_unit(robot: Robot) -> Iterator[Finding]:
             for name, value in node.params.items():
                 parts = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
                 if parts and parts[2] in UNITS:
-                    at, *_ = node.places.get(name, (node.at,))
+                    span, *_ = node.places.get(name, (node.span,))
                     message = f"{node.name} gets the parameter {name} as a string: {value}"
                     advice = (
                         f"parameters have no units: write {name}: {parts[1]}, in the unit that the"
                         " node expects"
                     )
-                    yield finding("TF859", message, at, help=advice)
+                    yield finding("TF859", message, span, help=advice)

@@ -44,7 +44,7 @@ def rule(
     The function has the name that the catalogue has for the code.
     """
 
-    def made(find: Find) -> Rule:
+    def make_rule(find: Find) -> Rule:
         return Rule(code, find, of_urdf, follows, idle)
 
-    return made
+    return make_rule

@@ -11,14 +11,14 @@ from tfcompose.compiler.check.poses import (
     are_swapped,
     envelope,
     is_near,
-    placed,
+    poses_in_base,
     side_of,
     twins,
 )
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, angle_between, norm
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.model.robot import is_optical
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def calibration_probably_inverse(robot: Robot) -> Iterator[Finding]:
             advice = _if_inverse(measured)
             if measured.nominal:
                 advice += "; if the file is right, correct the pose that is written beside it"
-            note = Note("measured here", measured.at)
+            note = Note("measured here", measured.span)
             yield finding("TF615", message, measured.named_at, help=advice, notes=[note])
 
 
@@ -116,7 +116,7 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
                 advice = (
                     f"the pose beside it is probably that of {measured.child}: name it as place"
                 )
-            notes = [Note("measured here", measured.at)]
+            notes = [Note("measured here", measured.span)]
             yield finding("TF616", message, measured.named_at, help=advice, notes=notes)
 
 
@@ -173,7 +173,7 @@ def calibration_all_zero(robot: Robot) -> Iterator[Finding]:
                 message,
                 measured.named_at,
                 help=advice,
-                notes=[Note("measured here", measured.at)],
+                notes=[Note("measured here", measured.span)],
             )
 
 
@@ -195,8 +195,8 @@ def calibration_copied(robot: Robot) -> Iterator[Finding]:
         if other is not measured:
             message = f"{measured.name} has the same values as that of {other.child}"
             notes = [
-                Note(f"{other.child} was measured here", other.at),
-                Note("measured here", measured.at),
+                Note(f"{other.child} was measured here", other.span),
+                Note("measured here", measured.span),
             ]
             advice = "name each mount's own entry, or calibrate the second one"
             yield finding("TF618", message, measured.named_at, help=advice, notes=notes)
@@ -224,11 +224,11 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
         turned = angle_between(edge.pose.quat_xyzw, other.pose.quat_xyzw)
         if other is not edge and turned < _SAME_RAD and not are_mirrored(other, edge):
             message = f"{edge.sensor} and {other.sensor} are at the same pose in {edge.parent}"
-            notes = [Note(f"{other.sensor} is mounted here", other.at)]
+            notes = [Note(f"{other.sensor} is mounted here", other.span)]
             yield finding(
                 "TF621",
                 message,
-                edge.xyz_at or edge.at,
+                edge.xyz_at or edge.span,
                 help="measure the pose of one of them",
                 notes=notes,
             )
@@ -251,17 +251,17 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
                 f"{wrong.child} and {right.child} are both at [{x:g}, {y:g}, {z:g}] in"
                 f" {edge.parent}"
             )
-            notes = [Note(f"{right.child} is defined here", right.xyz_at or right.at)]
+            notes = [Note(f"{right.child} is defined here", right.xyz_at or right.span)]
             advice = (
                 f"change the sign of {'xy'[axis]} of {wrong.child}: y is positive to the left,"
                 " x to the front"
             )
-            yield finding("TF622", message, wrong.xyz_at or wrong.at, help=advice, notes=notes)
+            yield finding("TF622", message, wrong.xyz_at or wrong.span, help=advice, notes=notes)
 
 
 @rule("TF625", of_urdf=True, follows="pose")
 def sides_swapped(robot: Robot) -> Iterator[Finding]:
-    poses = placed(robot, moving=True)
+    poses = poses_in_base(robot, moving=True)
     edges: dict[str, Edge] = {}
     for edge in robot.edges:
         base = poses.get(edge.parent)
@@ -286,9 +286,9 @@ def sides_swapped(robot: Robot) -> Iterator[Finding]:
                 for side in (twin, edge)
             )
             message = f"{places} in {edge.parent}: each is on the other's side"
-            notes = [Note(f"{twin.child} is defined here", twin.xyz_at or twin.at)]
+            notes = [Note(f"{twin.child} is defined here", twin.xyz_at or twin.span)]
             advice = "swap the signs, or the names: y is positive to the left, x to the front"
-            yield finding("TF625", message, edge.xyz_at or edge.at, help=advice, notes=notes)
+            yield finding("TF625", message, edge.xyz_at or edge.span, help=advice, notes=notes)
 
 
 #: Parts of parameter names that tell two devices apart as a serial number does.
@@ -325,14 +325,13 @@ def serial_missing(robot: Robot) -> Iterator[Finding]:
         others = [other for other in group if other is not sensor]
         same = "the same driver"
         if len(nameless) > 1:
-            message = (
-                f"{listed([each.name for each in nameless])} have no serial numbers, and {same}"
-            )
+            names = list_names([each.name for each in nameless])
+            message = f"{names} have no serial numbers, and {same}"
         else:
             message = f"{sensor.name} has no serial number, and {others[0].name} has {same}"
-        notes = [Note(f"{other.name} is defined here", other.at) for other in others]
+        notes = [Note(f"{other.name} is defined here", other.span) for other in others]
         advice = f'add options: {{{sensor.serial_option}: "…"}}'
-        yield finding("TF623", message, sensor.at, help=advice, notes=notes)
+        yield finding("TF623", message, sensor.span, help=advice, notes=notes)
 
 
 def _names_device(process: Process) -> bool:
@@ -359,9 +358,9 @@ def serial_used_twice(robot: Robot) -> Iterator[Finding]:
                 message = (
                     f"{sensor.name} and {other.name} have the same serial number {sensor.serial}"
                 )
-                notes = [Note(f"{other.name} is defined here", other.at)]
+                notes = [Note(f"{other.name} is defined here", other.span)]
                 advice = "correct the number of one of the two"
-                yield finding("TF624", message, sensor.at, help=advice, notes=notes)
+                yield finding("TF624", message, sensor.span, help=advice, notes=notes)
     yield from _addresses_used_twice(robot, found)
 
 
@@ -391,11 +390,11 @@ def _addresses_used_twice(robot: Robot, found: set[str]) -> Iterator[Finding]:
             key = _shared_parameter(process, other, mine, addresses[other.name])
             if key:
                 message = f"{process.name} and {other.name} have the same {key} {mine[key]}"
-                notes = [Note(f"{other.name} is defined here", other.at)]
+                notes = [Note(f"{other.name} is defined here", other.span)]
                 advice = f"correct {key} of one of the two"
                 severity: Severity = "error" if _EXCLUSIVE.fullmatch(mine[key]) else "warning"
                 yield finding(
-                    "TF624", message, process.at, help=advice, notes=notes, severity=severity
+                    "TF624", message, process.span, help=advice, notes=notes, severity=severity
                 )
                 break
         before.append(process)

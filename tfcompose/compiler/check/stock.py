@@ -63,7 +63,7 @@ def _of_static_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     if edge is None:
         message = f"{process.name} publishes {parent} → {child}, which is not declared"
         advice = f"replace it by frames: {{{child}: {{parent: {parent}, xyz: […], rpy: […]}}}}"
-        yield finding("TF317", message, process.at, help=advice, severity="warning")
+        yield finding("TF317", message, process.span, help=advice, severity="warning")
     elif edge.owner != process.name:
         yield _publishes_too(process, f"{parent} → {child}", edge)
 
@@ -107,7 +107,7 @@ def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     )  # its own edge may be among them
     if text is None and (mine or refused or robot.excuses(process.name)):
         return
-    children = {*_CHILD.findall(text)} if text is not None else robot.described()
+    children = {*_CHILD.findall(text)} if text is not None else robot.described_frames()
     prefix = params.get("frame_prefix", "")
     known = {robot.final(frame): frame for frame in robot.frames}
     if prefix or text is not None:
@@ -142,7 +142,7 @@ def _params_on_the_command_line(process: Process) -> dict[str, str]:
 def _publishes_too(process: Process, what: str, edge: Edge, *, sure: bool = True) -> Finding:
     will = "publishes" if sure else "probably publishes"
     message = f"{process.name} {will} {what}, and so does {edge.owner}, the owner"
-    notes = [Note(f"{edge.name} is defined here", edge.owner_at or edge.at)]
+    notes = [Note(f"{edge.name} is defined here", edge.owner_at or edge.span)]
     advice = (
         f"remove {process.name}, or write owner: {process.name} on the edges that it is meant to"
         " publish"
@@ -150,7 +150,7 @@ def _publishes_too(process: Process, what: str, edge: Edge, *, sure: bool = True
     return finding(
         "TF317",
         message,
-        process.at,
+        process.span,
         help=advice,
         notes=notes,
         severity="error" if sure else "warning",

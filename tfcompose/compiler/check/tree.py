@@ -9,7 +9,7 @@ from tfcompose.compiler.check.names import valid_name
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, Span, did_you_mean, finding
 from tfcompose.foundation.tree import below, children_of
-from tfcompose.model.robot import left_out_by
+from tfcompose.model.robot import advise_left_out
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,9 +24,9 @@ def two_parents(robot: Robot) -> Iterator[Finding]:
         other = first.setdefault(edge.child, edge)
         if other.parent != edge.parent:
             message = f"{edge.child} has two parents: {other.parent} and {edge.parent}"
-            notes = [Note(f"{other.name} is defined here, owned by {other.owner}", other.at)]
+            notes = [Note(f"{other.name} is defined here, owned by {other.owner}", other.span)]
             advice = "remove one of the two edges, or swap parent and child of one"
-            yield finding("TF201", message, edge.at, notes=notes, help=advice)
+            yield finding("TF201", message, edge.span, notes=notes, help=advice)
 
 
 @rule("TF202", of_urdf=True)
@@ -43,7 +43,8 @@ def cycle(robot: Robot) -> Iterator[Finding]:
             loop = list(path)[list(path).index(frame) :]
             names = " → ".join([*reversed(loop), loop[-1]])
             notes = [
-                Note(f"{above[child].name} is defined here", above[child].at) for child in loop[1:]
+                Note(f"{above[child].name} is defined here", above[child].span)
+                for child in loop[1:]
             ]
             advice = (
                 "parent and child of one of these edges are probably swapped: swap them, or remove"
@@ -55,7 +56,9 @@ def cycle(robot: Robot) -> Iterator[Finding]:
                     advice += (
                         f", and let the part share the frame: ros: {{shared_frames: [{frame}]}}"
                     )
-            yield finding("TF202", f"cycle: {names}", above[loop[0]].at, notes=notes, help=advice)
+            yield finding(
+                "TF202", f"cycle: {names}", above[loop[0]].span, notes=notes, help=advice
+            )
         done.update(path)
     for edge in robot.edges:
         for parent in edge.switched:
@@ -70,7 +73,7 @@ def cycle(robot: Robot) -> Iterator[Finding]:
                 yield finding(
                     "TF202",
                     message,
-                    edge.at,
+                    edge.span,
                     help=f"remove {parent} from the parents of {edge.child}",
                 )
 
@@ -86,13 +89,13 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
     moved = {edge.child for edge in robot.edges if edge.joint_name}
     invalid = {valid_name(name) for name in robot.frames} - robot.frames.keys()  # TF501
 
-    def advice(name: str, at: Span, section: str, child: str = "") -> str:
-        if conditional := left_out_by(robot.conditions, name):
+    def advice(name: str, span: Span, section: str, child: str = "") -> str:
+        if conditional := advise_left_out(robot.conditions, name):
             return conditional
         near = robot.frames if next(searches) <= _MOST_SEARCHES else ()
         declare = (
             f'add <link name="{name}"/>'
-            if robot.is_foreign(at)
+            if robot.is_foreign(span)
             else f"declare it: {section}: {{{name}: {{}}}}"
         )
         return did_you_mean(name, [candidate for candidate in near if candidate != child], declare)
@@ -103,12 +106,15 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
                 message = f"{edge.child}: unknown parent frame {parent}"
                 section = "links" if parent in moved else "frames"
                 yield finding(
-                    "TF203", message, edge.at, help=advice(parent, edge.at, section, edge.child)
+                    "TF203",
+                    message,
+                    edge.span,
+                    help=advice(parent, edge.span, section, edge.child),
                 )
         if edge.child not in robot.frames and not robot.excuses(edge.child):
-            at = edge.child_at or edge.at
+            span = edge.child_at or edge.span
             message = f"joint {edge.joint_name}: unknown child link {edge.child}"
-            yield finding("TF203", message, at, help=advice(edge.child, at, "links"))
+            yield finding("TF203", message, span, help=advice(edge.child, span, "links"))
 
 
 @rule("TF204", of_urdf=True)
@@ -117,7 +123,7 @@ def several_roots(robot: Robot) -> Iterator[Finding]:
     main = _main_root(robot, grown)
     for root, frames in grown.items():
         if root != main and len(frames) > 1 and not robot.excuses(root):
-            at = robot.frames[root]
+            span = robot.frames[root]
             message = (
                 f"{root} is not connected to {main}: it is the root of a separate tree with"
                 f" {len(frames)} frames"
@@ -126,13 +132,13 @@ def several_roots(robot: Robot) -> Iterator[Finding]:
                 Note(f"{main}, the root of the robot's tree, is declared here", robot.frames[main])
             ]
             advice = f"give {root} a parent"
-            if robot.is_foreign(at):
+            if robot.is_foreign(span):
                 advice = "connect the trees with a fixed joint"
             elif "/" in root and root in robot.mounted.values():
                 advice += (
                     f", or share the frame: ros: {{shared_frames: [{root.rpartition('/')[2]}]}}"
                 )
-            yield finding("TF204", message, at, notes=notes, help=advice)
+            yield finding("TF204", message, span, notes=notes, help=advice)
 
 
 @rule("TF205", of_urdf=True)
@@ -140,13 +146,13 @@ def edge_given_twice(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], Edge] = {}
     for edge in robot.edges:
         other = first.setdefault((edge.parent, edge.child), edge)
-        has_owners = not robot.is_foreign(edge.at)
+        has_owners = not robot.is_foreign(edge.span)
         if other is not edge and not (has_owners and other.owner != edge.owner):
-            notes = [Note("first defined here", other.at)]
+            notes = [Note("first defined here", other.span)]
             yield finding(
                 "TF205",
                 f"edge {edge.name} is defined twice",
-                edge.at,
+                edge.span,
                 notes=notes,
                 help="remove one",
             )
@@ -155,10 +161,10 @@ def edge_given_twice(robot: Robot) -> Iterator[Finding]:
 @rule("TF206", of_urdf=True)
 def no_frames(robot: Robot) -> Iterator[Finding]:
     if not robot.frames and not robot.broken:
-        at = Span(robot.file)
-        advice = '<link name="base_link"/>' if robot.is_foreign(at) else "links: {base_link: {}}"
+        span = Span(robot.file)
+        advice = '<link name="base_link"/>' if robot.is_foreign(span) else "links: {base_link: {}}"
         yield finding(
-            "TF206", f"{robot.name or 'the robot'} has no frames", at, help=f"add {advice}"
+            "TF206", f"{robot.name or 'the robot'} has no frames", span, help=f"add {advice}"
         )
 
 
@@ -188,7 +194,7 @@ def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
                     "the order is earth → map → odom → base_link: swap parent and child, and"
                     " invert the pose"
                 )
-                yield finding("TF207", message, edge.at, help=advice)
+                yield finding("TF207", message, edge.span, help=advice)
                 break
             parent = above[parent].parent if parent in above else parent
 
@@ -208,9 +214,9 @@ def _base_not_below_odom(robot: Robot) -> Iterator[Finding]:
             others = robot.below(around.parent) - robot.below(odom)
             if base in others and odom not in robot.below(base):
                 message = f"{base} is beside {odom}, not below it: both are below {around.parent}"
-                notes = [Note(f"{odom} is defined here", around.at)]
+                notes = [Note(f"{odom} is defined here", around.span)]
                 advice = f"write {base}: {{parent: {odom}}}, which odometry publishes"
-                yield finding("TF207", message, edge.at, help=advice, notes=notes)
+                yield finding("TF207", message, edge.span, help=advice, notes=notes)
             break
 
 
@@ -229,7 +235,7 @@ def base_footprint_below_base_link(robot: Robot) -> Iterator[Finding]:
             advice = (
                 f"swap the two: {edge.parent}: {{parent: {edge.child}}}, with the inverse pose"
             )
-            yield finding("TF208", message, edge.at, help=advice)
+            yield finding("TF208", message, edge.span, help=advice)
 
 
 @rule("TF209", of_urdf=True)
@@ -238,7 +244,7 @@ def unused_frame(robot: Robot) -> Iterator[Finding]:
     main = _main_root(robot, grown)
     for root, frames in grown.items():
         if root != main and len(frames) == 1 and not robot.excuses(root):
-            at = robot.frames[root]
+            span = robot.frames[root]
             message = (
                 f"{'link' if root in robot.links else 'frame'} {root} has neither a parent nor a"
                 " child"
@@ -246,13 +252,13 @@ def unused_frame(robot: Robot) -> Iterator[Finding]:
             notes = [
                 Note(f"{main}, the root of the robot's tree, is declared here", robot.frames[main])
             ]
-            joint = robot.is_foreign(at)
+            joint = robot.is_foreign(span)
             advice = (
                 "remove it, or connect it with a joint"
                 if joint
                 else f"give {root} a parent, or remove it"
             )
-            yield finding("TF209", message, at, notes=notes, help=advice)
+            yield finding("TF209", message, span, notes=notes, help=advice)
 
 
 def _trees(robot: Robot) -> dict[str, set[str]]:

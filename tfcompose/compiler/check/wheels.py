@@ -7,7 +7,13 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.check.poses import are_mirrored, placed, side_of, twins, without_side
+from tfcompose.compiler.check.poses import (
+    are_mirrored,
+    poses_in_base,
+    side_of,
+    twins,
+    without_side,
+)
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.geometry import Pose, norm, rotate
@@ -75,15 +81,15 @@ def wheel_axis(robot: Robot) -> Iterator[Finding]:
         joint, shape = edge.joint, _cylinder(robot.links.get(edge.child))
         if joint is None or joint.axis_at is None:
             continue  # TF736
-        axis, at = _list_axis(joint.axis), joint.axis_at
+        axis, span = _list_axis(joint.axis), joint.axis_at
         if edge.child in odd:
             sibling, right = odd[edge.child]
             message = f"{edge.child} turns about {axis}, across the axis of {sibling.child}"
-            notes = [Note(f"{sibling.child} is mounted here", sibling.at)]
+            notes = [Note(f"{sibling.child} is mounted here", sibling.span)]
             advice = f"write {_axis(robot, edge, right)}"
             if max(map(abs, right)) < _PARALLEL:
                 advice = "correct its rotation, or its axis"
-            yield finding("TF733", message, at, help=advice, notes=notes)
+            yield finding("TF733", message, span, help=advice, notes=notes)
         elif shape and not _SWIVEL.search(f"{edge.child} {joint.name}".lower()):
             along = rotate(shape.pose.quat_xyzw, _Z)
             if not _are_parallel(along, joint.axis):
@@ -97,7 +103,7 @@ def _lying(robot: Robot, edge: Edge, shape: Shape, along: Vector) -> Finding:
     """
     joint, link = edge.joint, robot.links[edge.child]
     axis = joint.axis if joint else along
-    here, there = joint.axis_at or joint.at if joint else edge.at, link.at
+    here, there = joint.axis_at or joint.span if joint else edge.span, link.span
     message = (
         f"{edge.child} turns about {_list_axis(axis)}; its cylinder lies along {_list_axis(along)}"
     )
@@ -114,7 +120,7 @@ def _quarter(robot: Robot, edge: Edge, axis: Vector) -> str:
     """Return what to write for a quarter turn that lays z along x or y."""
     index = 0 if abs(axis[1]) > abs(axis[0]) else 1
     angles = ["0", "0", "0"]
-    if robot.is_foreign(edge.at):
+    if robot.is_foreign(edge.span):
         angles[index] = f"{math.pi / 2:.17g}"
         return f'<origin rpy="{" ".join(angles)}"/>'
     angles[index] = "90 deg"
@@ -123,7 +129,7 @@ def _quarter(robot: Robot, edge: Edge, axis: Vector) -> str:
 
 def _axis(robot: Robot, edge: Edge, axis: Vector) -> str:
     listed = _list_axis(axis)
-    if edge.joint and robot.is_foreign(edge.joint.at):
+    if edge.joint and robot.is_foreign(edge.joint.span):
         return f'<axis xyz="{listed[1:-1].replace(",", "")}"/>'
     return f"axis: {listed}"
 
@@ -134,7 +140,7 @@ def _odd_axes(robot: Robot, wheels: list[Edge]) -> dict[str, tuple[Edge, Vector]
     Siblings differ only in the side in their names. Of two wheels the odd one is that whose axis
     does not lead to the other. The axis is in the odd wheel's frame.
     """
-    poses = placed(robot, moving=True)
+    poses = poses_in_base(robot, moving=True)
     groups: dict[str, list[Edge]] = {}
     for edge in wheels:
         if edge.joint and edge.child in poses and _WHEEL.search(edge.child.lower()):
@@ -184,8 +190,8 @@ def wheels_not_mirrored(robot: Robot) -> Iterator[Finding]:
             message = f"{odd.child} is not at the mirrored position of {pattern.child}"
             message += f": [{numbers(odd.pose.xyz)}], and [{numbers(pattern.pose.xyz)}]"
             advice = f"if {pattern.child} is right, write {_origin(robot, odd, right)}"
-            notes = [Note(f"{pattern.child} is mounted here", pattern.xyz_at or pattern.at)]
-            yield finding("TF738", message, odd.xyz_at or odd.at, help=advice, notes=notes)
+            notes = [Note(f"{pattern.child} is mounted here", pattern.xyz_at or pattern.span)]
+            yield finding("TF738", message, odd.xyz_at or odd.span, help=advice, notes=notes)
 
 
 def _is_alike(wheel: Edge, others: Sequence[Edge]) -> bool:
@@ -199,14 +205,14 @@ def _is_alike(wheel: Edge, others: Sequence[Edge]) -> bool:
 
 
 def _origin(robot: Robot, edge: Edge, xyz: Vector) -> str:
-    if robot.is_foreign(edge.at):
+    if robot.is_foreign(edge.span):
         return f'xyz="{numbers(xyz)}"'
     return f"xyz: [{numbers(xyz).replace(' ', ', ')}]"
 
 
 @rule("TF626", follows="pose")
 def sensor_below_ground(robot: Robot) -> Iterator[Finding]:
-    poses = placed(robot, moving=True)
+    poses = poses_in_base(robot, moving=True)
     bottoms = {
         edge.child: bottom
         for edge in robot.edges
@@ -224,7 +230,7 @@ def sensor_below_ground(robot: Robot) -> Iterator[Finding]:
         if below > _UNDER_M:
             message = f"{sensor.name} is {below:.3g} m below the ground under {wheel}"
             advice = "z is positive upwards: check its sign and unit, and those of its parent"
-            notes = [Note(f"{wheel} is defined here", robot.links[wheel].at)]
+            notes = [Note(f"{wheel} is defined here", robot.links[wheel].span)]
             yield finding(
                 "TF626", message, _height_at(robot, sensor, edge), help=advice, notes=notes
             )
@@ -233,11 +239,11 @@ def sensor_below_ground(robot: Robot) -> Iterator[Finding]:
 def _height_at(robot: Robot, sensor: MountedSensor, edge: Edge) -> Span:
     """Return the place of the z of a sensor's mount."""
     places = (
-        value.place(2)
+        value.locate(2)
         for value in robot.source_numbers
         if (value.path[0], *value.path[2:]) == ("sensors", "xyz") and value.name == sensor.name
     )
-    return next(places, edge.at)
+    return next(places, edge.span)
 
 
 def _bottom(link: Link | None, pose: Pose) -> float | None:
@@ -268,5 +274,5 @@ def sensor_on_wheel(robot: Robot) -> Iterator[Finding]:
                 f"{sensor.name} turns with {wheel.child}, about {_list_axis(wheel.joint.axis)}"
             )
             advice = f"mount it on {wheel.parent}, which does not turn"
-            notes = [Note(f"{wheel.joint.name} is defined here", wheel.joint.at)]
-            yield finding("TF627", message, edge.at, help=advice, notes=notes)
+            notes = [Note(f"{wheel.joint.name} is defined here", wheel.joint.span)]
+            yield finding("TF627", message, edge.span, help=advice, notes=notes)

@@ -109,10 +109,10 @@ def _block(forest: Forest, flat: Layout, child: str) -> _Block:
     return _Block(
         tuple(frames),
         areas,
-        min([place.x for place in places] + [area.x for area in areas]),
-        min([2 * place.y - place.bottom for place in places] + [area.top for area in areas]),
-        max([place.right for place in places] + [area.right for area in areas]),
-        max([place.bottom for place in places] + [area.bottom for area in areas]),
+        min([box.x for box in places] + [area.x for area in areas]),
+        min([2 * box.y - box.bottom for box in places] + [area.top for area in areas]),
+        max([box.right for box in places] + [area.right for area in areas]),
+        max([box.bottom for box in places] + [area.bottom for area in areas]),
     )
 
 
@@ -158,8 +158,8 @@ def _place_blocks(
             lines[block.frames[0]] = x
             fall = y - block.top
             for frame in block.frames:
-                place = flat.places[frame]
-                places[frame] = replace(place, x=place.x + shift, y=place.y + fall)
+                box = flat.places[frame]
+                places[frame] = replace(box, x=box.x + shift, y=box.y + fall)
             areas += (
                 replace(
                     area,

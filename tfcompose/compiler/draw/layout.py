@@ -130,15 +130,15 @@ def _rows(
     Groups are keyed by the frame where they begin.
     """
     bands: dict[str, tuple[float, float]] = {}
-    row = max((place.height for place in places.values()), default=0.0)
+    row = max((box.height for box in places.values()), default=0.0)
     y = 0.0
     waiting = [(frame, False) for frame in reversed(forest.order) if frame not in forest.up]
     while waiting:
         frame, done = waiting.pop()
         if done:
-            place, children = places[frame], forest.children[frame]
+            box, children = places[frame], forest.children[frame]
             if not is_down:
-                place.y = (
+                box.y = (
                     round((places[children[0]].y + places[children[-1]].y) / 2)
                     if children
                     else y + row / 2
@@ -163,25 +163,25 @@ def _rows(
 
 def _columns(forest: Forest, places: dict[str, FrameBox]) -> None:
     for frame in forest.order:
-        place, children = places[frame], forest.children[frame]
+        box, children = places[frame], forest.children[frame]
         if frame not in forest.up and forest.enters(frame):
-            place.x = PAD
+            box.x = PAD
         if not children:
             continue
         span = places[children[-1]].y - places[children[0]].y
         gap: float = round(min(FARTHEST, NEAREST + STEEPNESS * span))
         gap += PAD if any(forest.enters(child) for child in children) else 0.0
         for child in children:
-            places[child].x = round(place.right) + gap
+            places[child].x = round(box.right) + gap
 
 
 def _indent(forest: Forest, places: dict[str, FrameBox]) -> None:
     for frame in forest.order:
-        place = places[frame]
+        box = places[frame]
         if frame not in forest.up and forest.enters(frame):
-            place.x = PAD
+            box.x = PAD
         for child in forest.children[frame]:
-            places[child].x = place.x + INDENT + (PAD if forest.enters(child) else 0.0)
+            places[child].x = box.x + INDENT + (PAD if forest.enters(child) else 0.0)
 
 
 def _areas(
@@ -195,7 +195,7 @@ def _areas(
     ``bands`` holds the top and bottom of a frame where a group begins, with its descendants.
     """
     order = forest.order
-    reach = {frame: place.right for frame, place in places.items()}
+    reach = {frame: box.right for frame, box in places.items()}
     count = dict.fromkeys(order, 1)
     areas = []
     for index in range(len(order) - 1, -1, -1):
@@ -224,12 +224,12 @@ def _own(
     """
     group = forest.group[begin]
     own = [places[frame] for frame in below if forest.group.get(frame) == group]
-    right = max(label, *(place.right for place in own)) + PAD
-    bottom = max(place.bottom for place in own) + PAD
+    right = max(label, *(box.right for box in own)) + PAD
+    bottom = max(box.bottom for box in own) + PAD
     if len(own) < len(below):
         for frame in below:
-            place = places[frame]
-            near = place.x - PAD < right and place.bottom - place.height - PAD < bottom
+            box = places[frame]
+            near = box.x - PAD < right and box.bottom - box.height - PAD < bottom
             if near and forest.group.get(frame) != group:
                 return None
     return right, bottom

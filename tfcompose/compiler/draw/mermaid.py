@@ -67,4 +67,4 @@ def _text(text: str) -> str:
 
     What could be a sign of the language is an entity.
     """
-    return _ESCAPED.sub(lambda found: f"#{ord(found[0])};", visible(text))
+    return _ESCAPED.sub(lambda match: f"#{ord(match[0])};", visible(text))

@@ -189,10 +189,10 @@ class _Pen:
         """Return each frame with the edge from its parent."""
         shapes: list[Shape] = []
         for frame in self.forest.order:
-            place, arrow = self.layout.places[frame], self.forest.up.get(frame)
+            box, arrow = self.layout.places[frame], self.forest.up.get(frame)
             if arrow:
                 shapes.append(self._edge(arrow))
-            shapes += self._frame(frame, place, arrow)
+            shapes += self._frame(frame, box, arrow)
         return shapes
 
     def _edge(self, arrow: Arrow) -> Curve:

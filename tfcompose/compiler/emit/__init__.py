@@ -5,6 +5,6 @@ Plan.json, URDF, xacro, parameters and pictures.
 The same robot gives the same bytes.
 """
 
-from tfcompose.compiler.emit.emit import described, emit
+from tfcompose.compiler.emit.emit import descriptions_of, emit
 
-__all__ = ["described", "emit"]
+__all__ = ["descriptions_of", "emit"]

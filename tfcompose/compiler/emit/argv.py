@@ -8,7 +8,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.param_files import matches
-from tfcompose.model.plan import PROGRAM, known_at_launch
+from tfcompose.model.plan import PROGRAM, is_known_at_launch
 from tfcompose.model.plan.components import json_value
 from tfcompose.model.robot import AsInFile, value_of_word
 
@@ -87,7 +87,7 @@ def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tup
     for key, value in params.items():
         if isinstance(value, dict):
             yield from _launch_time_params(value, f"{above}{key}.")
-        elif known_at_launch(value):
+        elif is_known_at_launch(value):
             yield f"{above}{key}", value
 
 
@@ -165,7 +165,7 @@ def _read_as_ros(value: Any) -> Any:
 def _known_params(params: dict[str, Any]) -> dict[str, Any]:
     kept = {}
     for key, value in params.items():
-        if not known_at_launch(value):
+        if not is_known_at_launch(value):
             kept[key] = value
         elif isinstance(value, dict) and (rest := _known_params(value)):
             kept[key] = rest
@@ -207,5 +207,5 @@ def _text(value: Any) -> str:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value).replace("inf", ".inf").replace("nan", ".nan")
     return _ESCAPED.sub(
-        lambda found: f"\\u{ord(found[0]):04x}", json.dumps(value, ensure_ascii=False)
+        lambda match: f"\\u{ord(match[0]):04x}", json.dumps(value, ensure_ascii=False)
     )

@@ -30,7 +30,7 @@ def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
     """
     live = robot.with_final_names()
     descriptions = {}
-    for part, robot_of in described(robot):
+    for part, robot_of in descriptions_of(robot):
         folder = f"{part}/" if part else ""
         descriptions[part] = _descriptions(robot_of, target, folder)
     stock = {part: files[1].text for part, files in descriptions.items()}
@@ -47,7 +47,7 @@ def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
     )
 
 
-def described(robot: Robot) -> list[tuple[str, Robot]]:
+def descriptions_of(robot: Robot) -> list[tuple[str, Robot]]:
     """Return what has a description of its own.
 
     The robot, and each part that is a robot, by its name.

@@ -36,7 +36,7 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
     needed = _needed_processes(robot)
     names = frozenset(process.name for process in needed)
     relative = {
-        file: _relative(file, robot.file) for file in {edge.at.file for edge in robot.edges}
+        file: _relative(file, robot.file) for file in {edge.span.file for edge in robot.edges}
     }
     prefixes = {f"{part.name}/{JOINTS}": part.prefix for part in robot.parts}
     edges = tuple(
@@ -44,7 +44,7 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
             _edge(
                 edge,
                 edge.node or nodes[edge.owner],
-                relative[edge.at.file],
+                relative[edge.span.file],
                 prefixes.get(edge.owner, ""),
             )
             for edge in robot.edges
@@ -65,10 +65,10 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
             for process in needed
         ),
         guard=robot.guard,
-        claims=tuple(claim.planned() for claim in robot.claims),
+        claims=tuple(claim.to_plan() for claim in robot.claims),
         args=robot.args,
         environment=robot.environment,
-        hosts={name: host.planned() for name, host in robot.hosts.items()},
+        hosts={name: host.to_plan() for name, host in robot.hosts.items()},
         sections={
             name: section.planned
             for name, section in robot.sections.items()
@@ -123,8 +123,8 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
             moving.mimic and moving.mimic.removeprefix(prefix),
         )
         joint = narrow(PlanJoint, moving, name=name, mimic=mimic)
-    return edge.planned(
-        node=node, pose=clean(edge.pose), source=SourceLine(file, edge.at.line), joint=joint
+    return edge.to_plan(
+        node=node, pose=clean(edge.pose), source=SourceLine(file, edge.span.line), joint=joint
     )
 
 
@@ -143,7 +143,7 @@ def _process(
     simulation = process.simulate
     if simulation:
         simulation = replace(simulation, pose=clean(simulation.pose))
-    return process.planned(
+    return process.to_plan(
         argv=argv_of(process, robot, has_params=has_params, owns=bool(owned)),
         params_file=f"params/{process.name}.yaml" if has_params else None,
         after={name: when for name, when in process.after.items() if name in names},
@@ -154,7 +154,7 @@ def _process(
             if process.part and process.kind in _PUBLISHERS
             else None
         ),
-        drives=driven_of(process, robot),
+        drives=driven_sensors(process, robot),
         switches=switches_of(process, robot),
         component=process.component
         and replace(process.component, params=component_params(process, robot)),
@@ -164,22 +164,23 @@ def _process(
 def _at(target: Target, process: PlanProcess) -> PlanProcess:
     """Return the process with each file's place seen from the plan's folder."""
 
-    def placed(text: str) -> str:
-        return _FILE.sub(lambda found: f"${{build_dir}}/{target.from_folder(found[1])}", text)
+    def resolve_text(text: str) -> str:
+        return _FILE.sub(lambda match: f"${{build_dir}}/{target.from_folder(match[1])}", text)
 
-    def placed_in(value: Any) -> Any:
-        return placed(value) if isinstance(value, str) else value
+    def resolve_paths(value: Any) -> Any:
+        return resolve_text(value) if isinstance(value, str) else value
 
-    env = {name: placed(value) for name, value in process.env.items()}
+    env = {name: resolve_text(value) for name, value in process.env.items()}
     component = process.component
     if component:
         component = replace(
-            component, params={name: placed_in(value) for name, value in component.params.items()}
+            component,
+            params={name: resolve_paths(value) for name, value in component.params.items()},
         )
-    cwd = process.cwd and placed(process.cwd)
+    cwd = process.cwd and resolve_text(process.cwd)
     return replace(
         process,
-        argv=tuple(placed(argument) for argument in process.argv),
+        argv=tuple(resolve_text(argument) for argument in process.argv),
         env=env,
         cwd=cwd,
         component=component,
@@ -196,9 +197,9 @@ def _on(main: str | None, process: PlanProcess) -> PlanProcess:
     return replace(process, host=main)
 
 
-def driven_of(process: Process, robot: Robot) -> tuple[Driven, ...]:
+def driven_sensors(process: Process, robot: Robot) -> tuple[Driven, ...]:
     """Return the sensors that the process drives and whose driver publishes by default."""
-    return tuple(_driven(sensor, robot) for sensor in _sensors(process, robot))
+    return tuple(_driven_sensor(sensor, robot) for sensor in _sensors(process, robot))
 
 
 def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
@@ -231,7 +232,7 @@ def _claim_of(sensor: MountedSensor) -> dict[str, Any]:
     return {key: value for off in sensor.claims.values() for key, value in off.items()}
 
 
-def _driven(sensor: MountedSensor, robot: Robot) -> Driven:
+def _driven_sensor(sensor: MountedSensor, robot: Robot) -> Driven:
     switch = _claim_of(sensor) if sensor.publishes else _switch(sensor)
     inside = (edge for edge in robot.edges if edge.sensor == sensor.name and not edge.given)
     frames: dict[str, PoseKnowledge] = {

@@ -56,7 +56,7 @@ def directions(optics: Optics) -> tuple[Vector, ...]:
 
     A plane is sampled a degree apart and in order, from its first angle to its last.
     """
-    return _directions(replace(optics, stream="", frame="", at=_NOWHERE, sources=()))
+    return _directions(replace(optics, stream="", frame="", span=_NOWHERE, sources=()))
 
 
 _NOWHERE = Span("")

@@ -16,26 +16,28 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding, Span
 
 
-def render_json(found: Sequence[Finding]) -> str:
+def render_json(findings: Sequence[Finding]) -> str:
     """Return the findings as a JSON list; a place that is not known is null."""
-    return json.dumps([_entry(finding) for finding in found], indent=2, ensure_ascii=False) + "\n"
+    return (
+        json.dumps([_entry(finding) for finding in findings], indent=2, ensure_ascii=False) + "\n"
+    )
 
 
-def _entry(found: Finding) -> dict[str, Any]:
+def _entry(finding: Finding) -> dict[str, Any]:
     end = (
-        {"end_line": found.span.end_line, "end_column": found.span.end_column}
-        if found.span
+        {"end_line": finding.span.end_line, "end_column": finding.span.end_column}
+        if finding.span
         else {}
     )
     return {
-        "code": found.code,
-        "name": found.name,
-        "severity": found.severity,
-        "message": found.message,
-        **_place(found.span),
+        "code": finding.code,
+        "name": finding.name,
+        "severity": finding.severity,
+        "message": finding.message,
+        **_place(finding.span),
         **({"end_line": None, "end_column": None} | end),
-        "help": found.help,
-        "notes": [{"message": note.message} | _place(note.span) for note in found.notes],
+        "help": finding.help,
+        "notes": [{"message": note.message} | _place(note.span) for note in finding.notes],
     }
 
 
@@ -45,25 +47,27 @@ def _place(span: Span | None) -> dict[str, Any]:
     return {"file": span.file, "line": span.line, "column": span.column}
 
 
-def render_github(found: Sequence[Finding]) -> str:
+def render_github(findings: Sequence[Finding]) -> str:
     """Return the findings as workflow commands."""
-    return "".join(_annotation(finding) for finding in found)
+    return "".join(_annotation(finding) for finding in findings)
 
 
-def _annotation(found: Finding) -> str:
-    properties: dict[str, object] = {"title": found.label}
-    if found.span:
-        at = found.span
-        properties = {"file": at.file, "line": at.line, "col": at.column} | properties
-        if at.end_line == at.line:
-            properties["endColumn"] = at.end_column
-    notes = [": ".join(map(str, filter(None, (note.span, note.message)))) for note in found.notes]
-    lines = [found.message, *notes, *([f"help: {found.help}"] if found.help else [])]
+def _annotation(finding: Finding) -> str:
+    properties: dict[str, object] = {"title": finding.label}
+    if finding.span:
+        span = finding.span
+        properties = {"file": span.file, "line": span.line, "col": span.column} | properties
+        if span.end_line == span.line:
+            properties["endColumn"] = span.end_column
+    notes = [
+        ": ".join(map(str, filter(None, (note.span, note.message)))) for note in finding.notes
+    ]
+    lines = [finding.message, *notes, *([f"help: {finding.help}"] if finding.help else [])]
     message = "\n".join(map(visible, lines))
     listed = ",".join(
         f"{name}={_escape_property(visible(str(value)))}" for name, value in properties.items()
     )
-    return f"::{found.severity} {listed}::{_escape(message)}\n"
+    return f"::{finding.severity} {listed}::{_escape(message)}\n"
 
 
 def _escape(text: str) -> str:
@@ -77,9 +81,9 @@ def _escape_property(text: str) -> str:
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def render_sarif(found: Sequence[Finding], version: str) -> str:
+def render_sarif(findings: Sequence[Finding], version: str) -> str:
     """Return the findings as one run of tfcompose, with the page of each code."""
-    codes = sorted({finding.code for finding in found})
+    codes = sorted({finding.code for finding in findings})
     run = {
         "tool": {
             "driver": {
@@ -89,7 +93,7 @@ def render_sarif(found: Sequence[Finding], version: str) -> str:
             }
         },
         "columnKind": "unicodeCodePoints",
-        "results": [_result(finding, codes.index(finding.code)) for finding in found],
+        "results": [_result(finding, codes.index(finding.code)) for finding in findings],
     }
     return (
         json.dumps(
@@ -111,19 +115,19 @@ def _rule(code: str) -> dict[str, Any]:
     }
 
 
-def _result(found: Finding, index: int) -> dict[str, Any]:
-    advice = f"\n{found.help}" if found.help else ""
+def _result(finding: Finding, index: int) -> dict[str, Any]:
+    advice = f"\n{finding.help}" if finding.help else ""
     result: dict[str, Any] = {
-        "ruleId": found.code,
+        "ruleId": finding.code,
         "ruleIndex": index,
-        "level": found.severity,
-        "message": {"text": f"{found.message}{advice}"},
+        "level": finding.severity,
+        "message": {"text": f"{finding.message}{advice}"},
     }
-    if found.span:
-        result["locations"] = [{"physicalLocation": _location(found.span)}]
+    if finding.span:
+        result["locations"] = [{"physicalLocation": _location(finding.span)}]
     related = [
         {"physicalLocation": _location(note.span), "message": {"text": note.message}}
-        for note in found.notes
+        for note in finding.notes
         if note.span
     ]
     return result | ({"relatedLocations": related} if related else {})
@@ -170,16 +174,16 @@ def render_junit(
     The other findings are in its output.
     """
     rows, failed, count = [], 0, 0
-    for group, name, found in cases:
+    for group, name, findings in cases:
         count += 1
-        fatal = [finding for finding in found if finding.severity in failing]
+        fatal = [finding for finding in findings if finding.severity in failing]
         failed += bool(fatal)
         body = "".join(
             f'    <failure type="{finding.code}"'
             f' message="{_xml(finding.message)}">{_xml(_details(finding))}</failure>\n'
             for finding in fatal[:1]
         )
-        others = [*fatal[1:], *(finding for finding in found if finding not in fatal)]
+        others = [*fatal[1:], *(finding for finding in findings if finding not in fatal)]
         if others:
             body += f"    <system-out>{_xml(chr(10).join(map(_details, others)))}</system-out>\n"
         head = f'  <testcase classname="{_xml(f"{suite}.{group}")}" name="{_xml(name)}" time="0"'
@@ -191,13 +195,13 @@ def render_junit(
     )
 
 
-def _details(found: Finding) -> str:
-    where = f"{found.span}: " if found.span else ""
+def _details(finding: Finding) -> str:
+    where = f"{finding.span}: " if finding.span else ""
     lines = [
-        f"{where}{found.severity}[{found.code}] {found.message}",
-        *(f"note: {note.message}" for note in found.notes),
+        f"{where}{finding.severity}[{finding.code}] {finding.message}",
+        *(f"note: {note.message}" for note in finding.notes),
     ]
-    return "\n".join([*lines, f"help: {found.help}"] if found.help else lines)
+    return "\n".join([*lines, f"help: {finding.help}"] if finding.help else lines)
 
 
 def _xml(text: str) -> str:

@@ -37,7 +37,7 @@ def no_address(code: str) -> str:
 
 
 def render_text(
-    found: Sequence[Finding],
+    findings: Sequence[Finding],
     line_of: Callable[[str, int], str | None],
     *,
     colour: bool,
@@ -49,7 +49,7 @@ def render_text(
     address is a link to it (OSC 8).
     """
     paint = _Paint(address_of, colour=colour)
-    return "".join(_one(finding, line_of, paint) for finding in found)
+    return "".join(_format_finding(finding, line_of, paint) for finding in findings)
 
 
 class _Paint:
@@ -65,22 +65,25 @@ class _Paint:
         return f"\033]8;;{address}\033\\{code}\033]8;;\033\\" if address else code
 
 
-def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
-    shade = RED if found.severity == "error" else YELLOW
-    place = _printable(f"{found.span}: ") if found.span else ""
-    message = _printable(found.message)
+def _format_finding(
+    finding: Finding, line_of: Callable[[str, int], str | None], paint: _Paint
+) -> str:
+    shade = RED if finding.severity == "error" else YELLOW
+    place = _printable(f"{finding.span}: ") if finding.span else ""
+    message = _printable(finding.message)
     head = (
-        f"{paint(place, BOLD)}{paint(f'{found.severity}[{paint.link(found.code)}]', shade, BOLD)}"
+        f"{paint(place, BOLD)}"
+        f"{paint(f'{finding.severity}[{paint.link(finding.code)}]', shade, BOLD)}"
         f" {paint(message, BOLD)}"
     )
     lines = [head]
-    if found.span:
-        lines += _excerpt(found.span, line_of, paint, shade)
-    for note in found.notes:
+    if finding.span:
+        lines += _excerpt(finding.span, line_of, paint, shade)
+    for note in finding.notes:
         at = f"{note.span}: " if note.span else ""
         lines.append(f"   {paint('note', BLUE)}: {_printable(at + note.message)}")
-    if found.help:
-        lines.append(f"   {paint('help', GREEN)}: {_printable(found.help)}")
+    if finding.help:
+        lines.append(f"   {paint('help', GREEN)}: {_printable(finding.help)}")
     return "\n".join(lines) + "\n"
 
 
@@ -109,12 +112,12 @@ def _excerpt(
     return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 
-def summary(found: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
+def summary(findings: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
     """Return the last line: counts of findings and files, and why warnings exit 0."""
-    errors = sum(finding.severity == "error" for finding in found)
-    warnings = len(found) - errors
+    errors = sum(finding.severity == "error" for finding in findings)
+    warnings = len(findings) - errors
     where = f"in {plural(files, 'file')}"
-    if not found:
+    if not findings:
         return f"no findings {where}\n"
     parts = [plural(n, noun) for n, noun in ((errors, "error"), (warnings, "warning")) if n]
     exits = "" if errors or warnings_fail else " (exit code 0; --fail-on warning makes it 1)"

@@ -54,25 +54,25 @@ def take_blocks(draft: Draft) -> Iterator[Finding]:
     known = (_NamesOrExcused(frames, robot.excuses), _NamesOrExcused(joints, robot.excuses))
     blocks = []
     for name, text in spec.xml.items():
-        at: Path = ("xml", name)
+        path: Path = ("xml", name)
         try:
             root = read_block(text, spec.spans.file)
             findings = [*faults_of(root, *known), *find_unexpanded(text, spec.spans.file)]
-            blocks.append(Block(name, spec.at(at), text))
+            blocks.append(Block(name, spec.span_of(path), text))
         except RejectedError as error:
             findings = [*error.findings]
-        for found in findings:
-            yield replace(found, span=_in_file(found.span, text, spec, at))
+        for finding in findings:
+            yield replace(finding, span=_in_file(finding.span, text, spec, path))
     draft.robot = replace(
         robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)
     )
 
 
 def _hardware(name: str, declared: HardwareSpec, spec: RobotSpec) -> Hardware:
-    at: Path = ("ros2_control", name)
+    path: Path = ("ros2_control", name)
     kinds = (("joint", declared.joints), ("sensor", declared.sensors), ("gpio", declared.gpios))
     components = tuple(
-        _component(kind, inner, component, spec.at_key((*at, f"{kind}s", inner)))
+        _component(kind, inner, component, spec.key_span((*path, f"{kind}s", inner)))
         for kind, components in kinds
         for inner, component in components.items()
     )
@@ -80,7 +80,7 @@ def _hardware(name: str, declared: HardwareSpec, spec: RobotSpec) -> Hardware:
         name,
         declared.plugin,
         declared.type,
-        at=spec.at_key(at),
+        span=spec.key_span(path),
         params=declared.params,
         components=components,
         rw_rate=declared.rw_rate,
@@ -88,23 +88,23 @@ def _hardware(name: str, declared: HardwareSpec, spec: RobotSpec) -> Hardware:
     )
 
 
-def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> HardwareComponent:
+def _component(kind: str, name: str, spec: ComponentSpec, span: Span) -> HardwareComponent:
     command, state = (
         [Interface(i, params) for i, params in interfaces.items()]
         for interfaces in (spec.command, spec.state)
     )
     return HardwareComponent(
-        kind, name, at, command=tuple(command), state=tuple(state), params=spec.params
+        kind, name, span, command=tuple(command), state=tuple(state), params=spec.params
     )
 
 
-def _in_file(span: Span | None, text: str, spec: RobotSpec, at: Path) -> Span:
+def _in_file(span: Span | None, text: str, spec: RobotSpec, path: Path) -> Span:
     """Return the place in the robot file of a place in the block, whose text starts at line 2.
 
     Only in a literal block (``|``) are the lines those of the file; elsewhere it is the whole
     value.
     """
-    value, key = spec.at(at), spec.at_key(at)
+    value, key = spec.span_of(path), spec.key_span(path)
     lines = text.rstrip("\n").count("\n") + 1
     if span is None or value.end_line - value.line < lines:
         return value

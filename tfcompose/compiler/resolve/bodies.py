@@ -35,53 +35,53 @@ FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 class Bodies:
     """Makes links of what is written.
 
-    ``found`` holds what is wrong with the files of meshes and textures.
+    ``findings`` holds what is wrong with the files of meshes and textures.
     """
 
     spec: RobotSpec
     packages: Packages = field(default_factory=Packages)
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(
         default_factory=dict
     )
 
     def link(self, name: str, body: specs.LinkSpec) -> Link:
         """Return the link with its shapes and, where it has a mass, its inertia."""
-        place = self.spec.at_key(("links", name))
+        span = self.spec.key_span(("links", name))
         if (
             id(body) not in self._known
         ):  # aliases of one anchor are one object, and have the same shapes
             self._known[id(body)] = self._parts(body, ("links", name))
         visuals, collisions, inertial = self._known[id(body)]
-        if inertial and inertial.at:
-            inertial = replace(inertial, at=place)
-        return Link(name, place, visuals, collisions, inertial, has_mass=body.inertial is not None)
+        if inertial and inertial.span:
+            inertial = replace(inertial, span=span)
+        return Link(name, span, visuals, collisions, inertial, has_mass=body.inertial is not None)
 
     def _parts(
-        self, body: specs.LinkSpec, at: Path
+        self, body: specs.LinkSpec, path: Path
     ) -> tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]:
-        visuals = self._shapes(body.visual, (*at, "visual"))
+        visuals = self._shapes(body.visual, (*path, "visual"))
         collisions = (
             visuals
             if body.collision == "same"
-            else self._shapes(body.collision, (*at, "collision"))
+            else self._shapes(body.collision, (*path, "collision"))
         )
         inertial = None
         if body.inertial:
-            inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))
+            inertial = self._inertial(body.inertial, visuals, collisions, (*path, "inertial"))
         if inertial and body.inertial:
             key = "mass" if body.inertial.mass else "density"
-            inertial = replace(inertial, mass_at=self.spec.at((*at, "inertial", key)))
+            inertial = replace(inertial, mass_at=self.spec.span_of((*path, "inertial", key)))
         return visuals, collisions, inertial
 
-    def shape(self, shape: specs.ShapeSpec, at: Path) -> Shape:
+    def shape(self, shape: specs.ShapeSpec, path: Path) -> Shape:
         """Return the shape, which must have a form."""
         material = None
         if shape.material:
-            material = self._material(shape.material, (*at, "material"))
+            material = self._material(shape.material, (*path, "material"))
         elif shape.color:
             material = Material(
-                colour_name(shape.color), shape.color, at=self.spec.at((*at, "color"))
+                colour_name(shape.color), shape.color, span=self.spec.span_of((*path, "color"))
             )
         pose = pose_of(shape)
         if shape.box:
@@ -95,52 +95,54 @@ class Bodies:
         if shape.capsule:
             return Shape("capsule", (shape.capsule.radius, shape.capsule.length), pose, material)
         if shape.mesh:
-            place = self.spec.at((*at, "mesh", "uri"))
-            mesh, wrong = self.packages.asset(shape.mesh.uri, place)
-            self.found += [wrong] if wrong else []
+            span = self.spec.span_of((*path, "mesh", "uri"))
+            mesh, wrong = self.packages.asset(shape.mesh.uri, span)
+            self.findings += [wrong] if wrong else []
             return Shape("mesh", shape.mesh.scale, pose, material, mesh)
         raise ValueError("a shape without a form")
 
-    def _shapes(self, shapes: tuple[specs.ShapeSpec, ...], at: Path) -> tuple[Shape, ...]:
+    def _shapes(self, shapes: tuple[specs.ShapeSpec, ...], path: Path) -> tuple[Shape, ...]:
         made = []
         for index, shape in enumerate(shapes):
             if any(getattr(shape, form) for form in FORMS):
-                in_list = (*at, index)
-                made.append(self.shape(shape, in_list if self.spec.spans.has(in_list) else at))
+                in_list = (*path, index)
+                made.append(self.shape(shape, in_list if self.spec.spans.has(in_list) else path))
         return tuple(made)
 
-    def _material(self, declared: specs.MaterialSpec, at: Path) -> Material:
+    def _material(self, declared: specs.MaterialSpec, path: Path) -> Material:
         """Return the colour with its name.
 
         One without is named after its parts, so that URDF keeps them apart.
         """
         texture = None
         if declared.texture is not None:
-            texture, wrong = self.packages.asset(declared.texture, self.spec.at((*at, "texture")))
-            self.found += [wrong] if wrong else []
+            texture, wrong = self.packages.asset(
+                declared.texture, self.spec.span_of((*path, "texture"))
+            )
+            self.findings += [wrong] if wrong else []
         name, rgba = declared.name, declared.rgba
         if name is None:
             rgba = rgba if rgba or texture else (0.5, 0.5, 0.5, 1.0)
             name = colour_name(rgba or ())
             name = name if texture is None else f"{name}_{_word(texture.uri)}"
-        return Material(name, rgba, texture, self.spec.at(at))
+        return Material(name, rgba, texture, self.spec.span_of(path))
 
     def _inertial(
         self,
         declared: specs.InertialSpec,
         visuals: tuple[Shape, ...],
         collisions: tuple[Shape, ...],
-        at: Path,
+        path: Path,
     ) -> Inertial | None:
-        shapes, place = collisions or visuals, self.spec.at_key(at[:2])
+        shapes, span = collisions or visuals, self.spec.key_span(path[:2])
         pose = Pose(declared.xyz or (0.0, 0.0, 0.0), rotation_of(declared) or Pose().quat_xyzw)
         if declared.inertia and declared.mass:
             i = declared.inertia
             tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
             return Inertial(
-                declared.mass, pose, tensor, traces(declared.mass, visuals, collisions), place
+                declared.mass, pose, tensor, traces(declared.mass, visuals, collisions), span
             )
-        moments = self.moments(shapes, self.spec.at_key(at)) if shapes else None
+        moments = self.moments(shapes, self.spec.key_span(path)) if shapes else None
         if moments is None:
             return None
         density = declared.density or (declared.mass or 0.0) / moments.volume
@@ -148,12 +150,12 @@ class Bodies:
             i = declared.inertia
             tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
             return Inertial(
-                density * moments.volume, pose, tensor, (density * trace(moments.tensor),), place
+                density * moments.volume, pose, tensor, (density * trace(moments.tensor),), span
             )
         computed = inertial(moments, density, declared.mass)
         return replace(computed, pose=Pose(declared.xyz)) if declared.xyz else computed
 
-    def moments(self, shapes: tuple[Shape, ...], at: Span) -> Moments | None:
+    def moments(self, shapes: tuple[Shape, ...], span: Span) -> Moments | None:
         """Return the moments of the shapes at density 1 in the link's axes, None if unknown.
 
         The reason is then a finding.
@@ -171,14 +173,14 @@ class Bodies:
             if not shape.mesh.path:
                 message = f"{shape.mesh.uri}: it is not found here, and has no volume"
                 advice = "say where it is, give a collision shape, or give mass and inertia"
-                self.found.append(finding("TF725", message, at, help=advice))
+                self.findings.append(finding("TF725", message, span, help=advice))
                 return None
             try:
                 x, y, z = shape.size
                 parts.append(measure(shape.mesh.path, (x, y, z)).at(shape.pose))
             except UnmeasurableError as error:
-                self.found.append(
-                    finding(error.code, f"{shape.mesh.uri}: {error}", at, help=error.advice)
+                self.findings.append(
+                    finding(error.code, f"{shape.mesh.uri}: {error}", span, help=error.advice)
                 )
                 return None
         return join_moments(parts)

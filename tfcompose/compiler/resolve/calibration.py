@@ -24,7 +24,7 @@ from tfcompose.foundation.findings import (
 from tfcompose.model.robot import Calibration
 from tfcompose.spec.language.calibration import CalibrationFile, read_calibration, unreadable
 from tfcompose.spec.language.pose import CalibrationLimit, CalibrationSpec, MountKeys
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -47,8 +47,8 @@ def measure(draft: Draft) -> Iterator[Finding]:
     for index in draft.keys:
         work.measure(index)
     for position, name in enumerate(draft.spec.calibrations):
-        work.apply(name, draft.spec.at(("calibrations", position)))
-    yield from (*work.files.found, *work.found)
+        work.apply(name, draft.spec.span_of(("calibrations", position)))
+    yield from (*work.files.findings, *work.findings)
 
 
 @dataclass(slots=True)
@@ -56,27 +56,27 @@ class _Files:
     """Calibration files, each read once."""
 
     read: Reader | None
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     _known: dict[tuple[str, str], CalibrationFile] = field(default_factory=dict)
 
-    def get(self, named: str, at: Span, form: str = "auto") -> CalibrationFile:
+    def get(self, named: str, span: Span, form: str = "auto") -> CalibrationFile:
         """Return what the file says; what is wrong with it is said once."""
-        path = path_named(named, at)
+        path = find_path(named, span)
         if (path, form) not in self._known:
-            self._known[path, form] = self._load(path, at, form)
+            self._known[path, form] = self._load(path, span, form)
         return self._known[path, form]
 
-    def _load(self, path: str, at: Span, form: str) -> CalibrationFile:
+    def _load(self, path: str, span: Span, form: str) -> CalibrationFile:
         if self.read is None:
             loaded = unreadable(
-                path, form, at, [finding("TF001", "files cannot be read here", None)]
+                path, form, span, [finding("TF001", "files cannot be read here", None)]
             )
         else:
             try:
-                loaded = read_calibration(self.read(path), path, form, at)
+                loaded = read_calibration(self.read(path), path, form, span)
             except RejectedError as error:
-                loaded = unreadable(path, form, at, error.findings)
-        self.found += loaded.found
+                loaded = unreadable(path, form, span, error.findings)
+        self.findings += loaded.findings
         return loaded
 
 
@@ -118,7 +118,7 @@ def _matches(
 class _Calibrations:
     draft: Draft
     files: _Files
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     used: set[int] = field(default_factory=set)
     inside: dict[Path, set[str]] = field(default_factory=dict)
 
@@ -128,11 +128,11 @@ class _Calibrations:
         declared = keys.calibration if isinstance(keys, MountKeys) else None
         if declared is None:
             return
-        at = self.draft.spec.at((*edge.entry, "calibration", "file"))
-        file = self.files.get(declared.file, at, declared.format)
-        match = self._pick(index, declared, file, at)
+        span = self.draft.spec.span_of((*edge.entry, "calibration", "file"))
+        file = self.files.get(declared.file, span, declared.format)
+        match = self._pick(index, declared, file, span)
         if match:
-            self._take(index, match, file, declared, at)
+            self._take(index, match, file, declared, span)
 
     def _around(self, index: int) -> tuple[set[str], set[str]]:
         """Return the frame names that the edge's parent and child can have in its entry."""
@@ -143,7 +143,7 @@ class _Calibrations:
         )
 
     def _pick(
-        self, index: int, declared: CalibrationSpec, file: CalibrationFile, at: Span
+        self, index: int, declared: CalibrationSpec, file: CalibrationFile, span: Span
     ) -> _Match | None:
         own_parents, inside = self._around(index)
         nameless = [entry for entry in file.entries if entry.parent is None]
@@ -154,19 +154,19 @@ class _Calibrations:
         parents = _alias(declared.parent) if declared.parent else own_parents
         children = _alias(declared.child) if declared.child else inside
         matches = _matches(file.entries, parents, children)
-        if not matches and not file.found:
-            self._missing(declared, file, at, index)
+        if not matches and not file.findings:
+            self._missing(declared, file, span, index)
         if len(matches) > 1:
             self._ambiguous(
                 f"{self.draft.edges[index].name}: {len(matches)} entries of {file.file} fit",
-                at,
+                span,
                 matches,
             )
             return None
         return matches[0] if matches else None
 
     def _missing(
-        self, declared: CalibrationSpec, file: CalibrationFile, at: Span, index: int
+        self, declared: CalibrationSpec, file: CalibrationFile, span: Span, index: int
     ) -> None:
         edge = self.draft.edges[index]
         child = declared.child or place_of(self.draft.keys[index]) or edge.child
@@ -183,18 +183,18 @@ class _Calibrations:
         shown = [entry for entry in file.entries if near in {entry.child, entry.parent}] or list(
             file.entries
         )
-        notes = [Note(f"{entry.name} is defined here", entry.at) for entry in shown[:1]]
+        notes = [Note(f"{entry.name} is defined here", entry.span) for entry in shown[:1]]
         there = (
             f"there is {', '.join(entry.name for entry in file.entries[:6])}; parent: and child:"
             " pick one"
         )
         advice = f"did you mean {near}? {there}" if near else there
         message = f"{file.file} holds no pose of {child} in {parent}"
-        self.found.append(finding("TF612", message, at, help=advice, notes=notes))
+        self.findings.append(finding("TF612", message, span, help=advice, notes=notes))
 
-    def _ambiguous(self, message: str, at: Span, matches: Sequence[_Match]) -> None:
+    def _ambiguous(self, message: str, span: Span, matches: Sequence[_Match]) -> None:
         notes = [
-            Note(f"{match.entry.name} is defined here", match.entry.at) for match in matches[:4]
+            Note(f"{match.entry.name} is defined here", match.entry.span) for match in matches[:4]
         ]
         names = {match.entry.name for match in matches}
         advice = (
@@ -202,7 +202,7 @@ class _Calibrations:
             if len(names) > 1
             else "keep one of them in the file"
         )
-        self.found.append(finding("TF613", message, at, help=advice, notes=notes))
+        self.findings.append(finding("TF613", message, span, help=advice, notes=notes))
 
     def _take(
         self,
@@ -210,7 +210,7 @@ class _Calibrations:
         match: _Match,
         file: CalibrationFile,
         declared: CalibrationSpec | None,
-        at: Span,
+        span: Span,
     ) -> None:
         """Give the edge what an entry says."""
         self.used.add(id(match.entry))
@@ -229,38 +229,40 @@ class _Calibrations:
             child=child if child in frames and child else place_of(keys) or edge.child,
             pose=pose,
             entry=match.entry.pose,
-            at=match.entry.at,
+            span=match.entry.span,
             format=f"{file.format} {match.entry.what}".strip(),
-            named_at=at,
+            named_at=span,
             limit_m=limit.xyz,
             limit_rad=limit.rot,
             inverted=match.inverted,
         )
         self.draft.edges[index] = replace(edge, calibration=calibration)
 
-    def apply(self, named: str, at: Span) -> None:
+    def apply(self, named: str, span: Span) -> None:
         """Apply every entry of a file; one that nothing takes is a finding."""
-        file = self.files.get(named, at)
+        file = self.files.get(named, span)
         for index in self.draft.keys:
-            self._apply_to(index, file, at)
-        self._report_unused(file, at)
+            self._apply_to(index, file, span)
+        self._report_unused(file, span)
 
-    def _apply_to(self, index: int, file: CalibrationFile, at: Span) -> None:
+    def _apply_to(self, index: int, file: CalibrationFile, span: Span) -> None:
         edge, matches = self.draft.edges[index], self._fitting(index, file)
         measured = edge.calibration
         if len(matches) > 1:
-            self._ambiguous(f"{edge.name}: {len(matches)} entries of {file.file} fit", at, matches)
+            self._ambiguous(
+                f"{edge.name}: {len(matches)} entries of {file.file} fit", span, matches
+            )
             self.used.update(id(match.entry) for match in matches)
         elif matches and measured:
-            notes = [Note("the other one", measured.at), Note("this one", matches[0].entry.at)]
-            message = f"{edge.name} is measured twice: by {measured.at.file} and by {file.file}"
-            if matches[0].entry.at != measured.at:
-                self.found.append(
-                    finding("TF613", message, at, help="keep one of them", notes=notes)
+            notes = [Note("the other one", measured.span), Note("this one", matches[0].entry.span)]
+            message = f"{edge.name} is measured twice: by {measured.span.file} and by {file.file}"
+            if matches[0].entry.span != measured.span:
+                self.findings.append(
+                    finding("TF613", message, span, help="keep one of them", notes=notes)
                 )
             self.used.add(id(matches[0].entry))
         elif matches:
-            self._take(index, matches[0], file, None, at)
+            self._take(index, matches[0], file, None, span)
 
     def _fitting(self, index: int, file: CalibrationFile) -> list[_Match]:
         if not isinstance(self.draft.keys[index], MountKeys):
@@ -275,7 +277,7 @@ class _Calibrations:
             _Match(entry, inverted=False) for entry in elsewhere if entry.child in inside
         ]
 
-    def _report_unused(self, file: CalibrationFile, at: Span) -> None:
+    def _report_unused(self, file: CalibrationFile, span: Span) -> None:
         for entry in file.entries:
             if (
                 id(entry) in self.used or self.draft.spec.spans.is_variant
@@ -289,8 +291,8 @@ class _Calibrations:
             if entry.child is not None and entry.child not in self.draft.frames:
                 advice = did_you_mean(entry.child, self.draft.frames, advice)
             message = f"{file.file}: no mount uses {entry.name}"
-            note = Note("defined here", entry.at)
-            self.found.append(finding("TF619", message, at, help=advice, notes=[note]))
+            note = Note("defined here", entry.span)
+            self.findings.append(finding("TF619", message, span, help=advice, notes=[note]))
 
 
 def _alias(name: str) -> set[str]:

@@ -43,14 +43,14 @@ def settle_claims(draft: Draft) -> Iterator[Finding]:
     draft.robot = replace(
         robot, processes=processes, edges=edges, claims=(*robot.claims, *work.claims)
     )
-    yield from work.found
+    yield from work.findings
 
 
 @dataclass(slots=True)
 class _Claims:
     robot: Robot
     spec: RobotSpec
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     claims: list[Claim] = field(default_factory=list)
     publishers: dict[tuple[str, str], str] = field(default_factory=dict)
     known: set[str] = field(default_factory=set)
@@ -84,7 +84,7 @@ class _Claims:
         )
         if owner is None or owner.name in BUILT_IN or owner.name not in self.spec.processes:
             return edge
-        at = edge.owner_at or edge.at
+        span = edge.owner_at or edge.span
         entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
         if owner.name in self.known and owner.kind != "simulate":
             message = f"{owner.name} is not known to publish {edge.name}"
@@ -92,14 +92,14 @@ class _Claims:
                 f"if it does, add {entry} to {owner.name}; off can name the parameter that"
                 " stops it"
             )
-            self.found.append(finding("TF332", message, at, help=advice))
+            self.findings.append(finding("TF332", message, span, help=advice))
         elif len(owner.nodes) > 1:
             message = (
                 f"{owner.name} has {len(owner.nodes)} nodes, and none is known to publish"
                 f" {edge.name}"
             )
             advice = f"add to the node that does: {entry}"
-            self.found.append(finding("TF332", message, at, help=advice))
+            self.findings.append(finding("TF332", message, span, help=advice))
         return edge
 
     def _node(self, process: Process, node: Node) -> Claimant | None:
@@ -135,9 +135,9 @@ class _Claims:
         try:
             return node_preset(name)
         except KeyError:
-            self.found.append(unknown_node_preset(name, self.spec.at(path)))
+            self.findings.append(unknown_node_preset(name, self.spec.span_of(path)))
         except RejectedError as error:
-            self.found += error.findings
+            self.findings += error.findings
         return None
 
     def _of_one(self, claimant: Claimant) -> tuple[ClaimSpec, ...]:
@@ -190,10 +190,12 @@ class _Claims:
             advice = "remove it: tfcompose writes it"
             if not claimant.takes_parameters:
                 advice = (
-                    f"set {key}: {_shown(value)} where {claimant.process.name} is started, and"
-                    " here"
+                    f"set {key}: {_format_value(value)} where {claimant.process.name} is started,"
+                    " and here"
                 )
-            self.found.append(finding("TF333", message, self._at(claimant, key), help=advice))
+            self.findings.append(
+                finding("TF333", message, self._span_of(claimant, key), help=advice)
+            )
 
     def _is_own(self, claimant: Claimant, claim: ClaimSpec) -> bool:
         edge = self._edge(*claimant.ends(claim))
@@ -233,8 +235,8 @@ class _Claims:
             advice = f"raise {key}, or declare the rate that it has"
             if key == (preset and preset.period):
                 advice = f"write {key}: {1 / edge.rate:.3g}, or declare the rate that it has"
-            self.found.append(
-                finding("TF336", message, self._at(claimant, key), help=advice, notes=notes)
+            self.findings.append(
+                finding("TF336", message, self._span_of(claimant, key), help=advice, notes=notes)
             )
 
     def _take_own(self, claimant: Claimant, claim: ClaimSpec, edge: Edge) -> None:
@@ -249,9 +251,9 @@ class _Claims:
                 f"{claimant.process.name} owns {edge.name}, but a parameter turns that off:"
                 f" {switch_text(claim.off)}"
             )
-            place = self._at(claimant, next(iter(claim.off)))
-            self.found.append(
-                finding("TF333", message, place, help="remove it, or name another owner")
+            span = self._span_of(claimant, next(iter(claim.off)))
+            self.findings.append(
+                finding("TF333", message, span, help="remove it, or name another owner")
             )
 
     def _switch_off(self, claimant: Claimant, claim: ClaimSpec, name: str, other: Edge) -> None:
@@ -266,7 +268,9 @@ class _Claims:
                 f" {other.name}"
             )
             advice = "remove it: tfcompose writes the switch"
-            self.found.append(finding("TF333", message, self._at(claimant, against), help=advice))
+            self.findings.append(
+                finding("TF333", message, self._span_of(claimant, against), help=advice)
+            )
             return
         needed = any(
             self._is_own(claimant, own) and set(own.off) & set(claim.off)
@@ -279,11 +283,11 @@ class _Claims:
         message = f"{claimant.process.name} publishes {name} by default, which {other.owner} owns"
         if other.name != name:
             message = f"{claimant.process.name} publishes {name} by default, and {owner}"
-        self.found.append(
+        self.findings.append(
             finding(
                 "TF330",
                 message,
-                claimant.node.at,
+                claimant.node.span,
                 help=self._way_out(claimant, claim, needed=needed),
             )
         )
@@ -316,7 +320,7 @@ class _Claims:
             f"{claimant.process.name} publishes {parent} → {child} by default, which no process"
             " declared"
         )
-        self.found.append(finding("TF331", message, claimant.node.at, help=advice))
+        self.findings.append(finding("TF331", message, claimant.node.span, help=advice))
 
     def _settle_pattern(
         self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str
@@ -335,10 +339,10 @@ class _Claims:
             " does not allow"
         )
         advice = f'guard: {{allow: [{{child: "{child}"}}]}}'
-        self.found.append(finding("TF331", message, claimant.node.at, help=advice))
+        self.findings.append(finding("TF331", message, claimant.node.span, help=advice))
 
-    def _at(self, claimant: Claimant, key: str) -> Span:
-        return self.spec.at((*claimant.node.path, "params", *key.split(".")))
+    def _span_of(self, claimant: Claimant, key: str) -> Span:
+        return self.spec.span_of((*claimant.node.path, "params", *key.split(".")))
 
 
 @dataclass(slots=True)
@@ -386,7 +390,7 @@ class Claimant:
         return process.takes_ros_arguments or "${params_file}" in " ".join(process.argv)
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 

@@ -41,11 +41,13 @@ PROGRAMS = {
 
 def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Process:
     """Return the process of a container; it is ready when it can load."""
-    at: Path = ("containers", name)
+    path: Path = ("containers", name)
     namespace = namespace_of(declared, spec.ros.namespace)
-    node = Node(full_name(namespace, declared.node or name), spec.at_key(at), at, declared.params)
+    node = Node(
+        full_name(namespace, declared.node or name), spec.key_span(path), path, declared.params
+    )
     kind: ProcessKind = "external" if declared.external else "run"
-    process = Process(name, kind, at=spec.at_key(at), ros_nodes=(node,), loads=True)
+    process = Process(name, kind, span=spec.key_span(path), ros_nodes=(node,), loads=True)
     process = replace(
         process, **how(declared, namespace, "external" if declared.external else "container")
     )
@@ -100,13 +102,13 @@ def _check_component(process: Process, component: Component, draft: Draft) -> It
             )
         advice = did_you_mean(name, known, otherwise)
         message = f"the container of {process.name} is {name}, which is not a container"
-        yield finding("TF813", message, spec.at((*path, "container")), help=advice)
+        yield finding("TF813", message, spec.span_of((*path, "container")), help=advice)
     if process.ready and process.ready.kind in {"exit", "log"}:
         what = "end" if process.ready.kind == "exit" else "output"
         message = f"{process.name} is a component, and has no {what} of its own"
-        place = spec.at_key((*path, "ready", process.ready.kind))
+        span = spec.key_span((*path, "ready", process.ready.kind))
         yield finding(
-            "TF107", message, place, help="wait for edges, a topic, a service or a lifecycle state"
+            "TF107", message, span, help="wait for edges, a topic, a service or a lifecycle state"
         )
     for where, values in (
         ("params", process.ros_nodes[0].flat_params),
@@ -117,7 +119,7 @@ def _check_component(process: Process, component: Component, draft: Draft) -> It
                 exact: Path = (*path, where, *key.split("."))
                 at = exact if spec.spans.has(exact) else (*path, where)
                 yield finding(
-                    "TF103", f"{process.name}: {key} is {wrong}", spec.at(at), help=_KINDS
+                    "TF103", f"{process.name}: {key} is {wrong}", spec.span_of(at), help=_KINDS
                 )
 
 

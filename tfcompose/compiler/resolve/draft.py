@@ -81,7 +81,8 @@ class Draft:
     def __post_init__(self) -> None:
         spec = self.spec
         places = {
-            name: (folder, spec.at(("packages", name))) for name, folder in spec.packages.items()
+            name: (folder, spec.span_of(("packages", name)))
+            for name, folder in spec.packages.items()
         }
         self.packages = Packages(self.disk, places)
         self.broken = set(self.validated.broken)

@@ -41,20 +41,20 @@ if TYPE_CHECKING:
 def add_frames(draft: Draft) -> Iterator[Finding]:
     """Take the bare frames; one without a parent is a root, said so."""
     for name, frame in draft.spec.frames.items():
-        at = ("frames", name)
-        draft.frames.setdefault(name, draft.spec.at_key(at))
-        yield from add_edge(draft, at, name, frame, joint_name=frame.joint)
+        path = ("frames", name)
+        draft.frames.setdefault(name, draft.spec.key_span(path))
+        yield from add_edge(draft, path, name, frame, joint_name=frame.joint)
 
 
 def add_links(draft: Draft) -> Iterator[Finding]:
     """Take the bodies; one with a parent has a fixed edge."""
     bodies = Bodies(draft.spec, draft.packages)
     for name, link in draft.spec.links.items():
-        at = ("links", name)
-        draft.frames.setdefault(name, draft.spec.at_key(at))
+        path = ("links", name)
+        draft.frames.setdefault(name, draft.spec.key_span(path))
         draft.links[name] = bodies.link(name, link)
-        yield from add_edge(draft, at, name, link, joint_name=link.joint)
-    yield from bodies.found
+        yield from add_edge(draft, path, name, link, joint_name=link.joint)
+    yield from bodies.findings
 
 
 def add_joints(draft: Draft) -> Iterator[Finding]:
@@ -66,7 +66,7 @@ def add_joints(draft: Draft) -> Iterator[Finding]:
 
 def add_edge(  # noqa: PLR0913 (an edge has that many parts)
     draft: Draft,
-    at: Path,
+    path: Path,
     child: str,
     keys: EdgeKeys,
     *,
@@ -81,10 +81,10 @@ def add_edge(  # noqa: PLR0913 (an edge has that many parts)
     spec = draft.spec
     if keys.parent is None:
         return
-    joint = _joint_of(at, keys, spec) if isinstance(keys, JointSpec) else None
+    joint = _joint_of(path, keys, spec) if isinstance(keys, JointSpec) else None
     free = joint if joint and joint.type in FREE else None
     joint = None if free else joint
-    joint_at = yield from add_joint_name(draft, joint_name, at)
+    joint_at = yield from add_joint_name(draft, joint_name, path)
     owner = owner or keys.owner or (JOINTS if joint else STATIC)
     is_simulated = keys.static and any(
         process.name == owner and process.kind == "simulate" for process in draft.all_processes
@@ -101,25 +101,27 @@ def add_edge(  # noqa: PLR0913 (an edge has that many parts)
         kind=kind,
         pose=pose_of(keys, place_of(keys) or child),
         owner=owner,
-        at=spec.at((*at, "parent")),
+        span=spec.span_of((*path, "parent")),
         rate=keys.rate,
         joint=joint,
         free=free,
         joint_name=joint_name or "",
         joint_at=joint_at,
-        xyz_at=spec.spans.exactly_at((*at, "xyz")),
-        child_at=spec.at((*at, "child")) if at[0] == "joints" else None,
-        entry=at,
-        owner_at=spec.at((*at, "owner")) if keys.owner else None,
+        xyz_at=spec.spans.exact_span((*path, "xyz")),
+        child_at=spec.span_of((*path, "child")) if path[0] == "joints" else None,
+        entry=path,
+        owner_at=spec.span_of((*path, "owner")) if keys.owner else None,
         sensor=sensor,
-        rate_at=spec.at((*at, "rate")) if keys.rate else None,
+        rate_at=spec.span_of((*path, "rate")) if keys.rate else None,
         switched=keys.parent[1:],
-        optical_edits=partial(optical_edits, at, keys, spec.spans) if is_optical(child) else tuple,
+        optical_edits=partial(optical_edits, path, keys, spec.spans)
+        if is_optical(child)
+        else tuple,
     )
     draft.edges.append(edge)
 
 
-def add_joint_name(draft: Draft, name: str | None, at: Path) -> Finds[Span | None]:
+def add_joint_name(draft: Draft, name: str | None, path: Path) -> Finds[Span | None]:
     """Take the name of the joint that an entry is, or whose key ``joint`` it is.
 
     Return its place, None where there is no name.
@@ -127,13 +129,13 @@ def add_joint_name(draft: Draft, name: str | None, at: Path) -> Finds[Span | Non
     if not name:
         return None
     spec = draft.spec
-    place = spec.at_key(at) if at[0] == "joints" else spec.at((*at, "joint"))
+    span = spec.key_span(path) if path[0] == "joints" else spec.span_of((*path, "joint"))
     if name in draft.joints:
         notes = [Note("the other one", draft.joints[name])]
         message = f"two joints are called {name}"
-        yield finding("TF502", message, place, notes=notes, help="rename one")
-    draft.joints.setdefault(name, place)
-    return place
+        yield finding("TF502", message, span, notes=notes, help="rename one")
+    draft.joints.setdefault(name, span)
+    return span
 
 
 _MOVING = "revolute, continuous or prismatic"
@@ -145,7 +147,7 @@ _IDLE = {
 }
 
 
-def _joint_of(at: Path, declared: JointSpec, spec: RobotSpec) -> Joint | None:
+def _joint_of(path: Path, declared: JointSpec, spec: RobotSpec) -> Joint | None:
     """Return the joint with a unit axis, or None where it is fixed."""
     kind: Any = declared.type
     if kind == "fixed":
@@ -154,18 +156,18 @@ def _joint_of(at: Path, declared: JointSpec, spec: RobotSpec) -> Joint | None:
     x, y, z = declared.axis
     mimic = declared.mimic
     return Joint(
-        name=str(at[1]),
+        name=str(path[1]),
         type=kind,
-        at=spec.at_key(at),
-        mimic_at=spec.spans.exactly_at((*at, "mimic", "joint")),
+        span=spec.key_span(path),
+        mimic_at=spec.spans.exact_span((*path, "mimic", "joint")),
         axis=(x / length, y / length, z / length),
         limit=declared.limit,
-        limit_at=spec.spans.exactly_at((*at, "limit")),
+        limit_at=spec.spans.exact_span((*path, "limit")),
         mimic=mimic.joint if mimic else None,
         multiplier=mimic.multiplier if mimic else 1.0,
         offset=mimic.offset if mimic else 0.0,
         axis_length=length,
-        axis_at=spec.spans.exactly_at((*at, "axis")),
+        axis_at=spec.spans.exact_span((*path, "axis")),
         dynamics=declared.dynamics,
         safety=declared.safety_controller,
         reference=declared.calibration,
@@ -174,22 +176,22 @@ def _joint_of(at: Path, declared: JointSpec, spec: RobotSpec) -> Joint | None:
 
 def _idle_joint_keys(name: str, joint: JointSpec, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding where a joint has keys that joints of its type do not use."""
-    at: Path = ("joints", name)
+    path: Path = ("joints", name)
     unused = joint.model_fields_set & {*_IDLE.get(joint.type, ())}
     advice = (
         "leave it out" if joint.type in FREE else f"leave it out; if {name} moves, type: {_MOVING}"
     )
     if joint.type == "continuous" and joint.limit:
-        at = (*at, "limit")
+        path = (*path, "limit")
         unused = {key for key in ("lower", "upper") if getattr(joint.limit, key) is not None}
         advice = "leave it out; if there is an end, type: revolute"
-    idle = sorted(unused, key=lambda key: spec.at_key((*at, key)))
+    idle = sorted(unused, key=lambda key: spec.key_span((*path, key)))
     if idle:
         message = (
             f"the joint {name} is {joint.type}: {', '.join(idle)} {'have' if idle[1:] else 'has'}"
             " no effect"
         )
-        yield finding("TF727", message, spec.at_key((*at, idle[0])), help=advice)
+        yield finding("TF727", message, spec.key_span((*path, idle[0])), help=advice)
 
 
 _SECTIONS = ("frames", "links", "joints", "sensors", "parts", "processes")
@@ -245,7 +247,7 @@ def _numbers(numbers: dict[Any, float], path: Path, spans: Spans) -> SourceNumbe
         path,
         tuple(map(float, values)),
         with_unit,
-        lambda index: spans.at((*path, steps[index])),
+        lambda index: spans.span_of((*path, steps[index])),
         steps=tuple(steps),
     )
 
@@ -269,7 +271,10 @@ _OPTICAL_IN = ("frames", "links", "joints")
 
 def optical_edits(path: Path, keys: EdgeKeys, spans: Spans) -> tuple[Edit, ...]:
     """Return edits that rotate the frame of the entry at ``path``, none if others would move."""
-    if path[0] not in _OPTICAL_IN or spans.at(path).file != spans.at((*path, "parent")).file:
+    if (
+        path[0] not in _OPTICAL_IN
+        or spans.span_of(path).file != spans.span_of((*path, "parent")).file
+    ):
         return ()
     rotations = [key for key in _OPTICAL if spans.has_key((*path, key))]
     if len(rotations) > 1 or any(spans.has_key((*path, key)) for key in _OTHER_POSES):
@@ -279,13 +284,13 @@ def optical_edits(path: Path, keys: EdgeKeys, spans: Spans) -> tuple[Edit, ...]:
         edits = _replacement_edits(getattr(keys, key), _OPTICAL[key], (*path, key), spans)
     else:
         edits = [_insertion(path, spans)]
-    edited = [spans.at((*path, "parent")), *(edit.span for edit in edits)]
+    edited = [spans.span_of((*path, "parent")), *(edit.span for edit in edits)]
     return tuple(edits) if all(_is_alone(span, path, spans) for span in edited) else ()
 
 
 def _insertion(path: Path, spans: Spans) -> Edit:
     """Return the edit that writes the rotation after the parent."""
-    parent, entry = spans.at((*path, "parent")), spans.places.nearest(path)
+    parent, entry = spans.span_of((*path, "parent")), spans.places.nearest(path)
     first = min(
         (key.span for key in entry.keys.values()), key=lambda span: (span.line, span.column)
     )
@@ -293,7 +298,7 @@ def _insertion(path: Path, spans: Spans) -> Edit:
         at = (parent.end_line, parent.end_column)
         return Edit(Span(parent.file, *at, *at), f", {_RPY}")
     at = (parent.end_line + 1, 1)
-    indent = " " * (spans.at_key((*path, "parent")).column - 1)
+    indent = " " * (spans.key_span((*path, "parent")).column - 1)
     return Edit(Span(parent.file, *at, *at), f"{indent}{_RPY}\n")
 
 
@@ -316,14 +321,16 @@ def _replacement_edits(old: Any, new: Any, path: Path, spans: Spans) -> list[Edi
             for edit in _replacement_edits(*pair, (*path, index), spans)
         ]
     is_same = old == (new if isinstance(old, str) else quantity(new).value)
-    return [Edit(spans.at(path), new)] if isinstance(old, (str, float)) and not is_same else []
+    return (
+        [Edit(spans.span_of(path), new)] if isinstance(old, (str, float)) and not is_same else []
+    )
 
 
 def _is_alone(span: Span, path: Path, spans: Spans) -> bool:
     """Whether what is at the span belongs to this entry alone, and to no alias of it."""
     others = (
         other
-        for other, place in spans.places.walk()
-        if other[: len(path)] != path and place.span == span
+        for other, location in spans.places.walk()
+        if other[: len(path)] != path and location.span == span
     )
     return next(others, None) is None

@@ -21,7 +21,7 @@ from tfcompose.foundation.geometry import Pose, rpy_from_quat
 from tfcompose.model.robot import BUILT_IN, Node, Process, Robot
 from tfcompose.spec.language.robot import Origin
 from tfcompose.spec.language.variables import OF_FILES
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 class Foreign:
     """The robot of a URDF or xacro file. ``files`` are what it is written in.
 
-    ``found`` is what is wrong with it: errors, and the files that it names and that are not found.
-    Other warnings are for those who wrote it.
+    ``findings`` is what is wrong with it: errors, and the files that it names and that are not
+    found. Other warnings are for those who wrote it.
 
     ``implied`` are the frames that its joints hang on and that it does not have: the holder's,
     where a macro makes it.
@@ -46,7 +46,7 @@ class Foreign:
 
     robot: Robot
     files: tuple[str, ...]
-    found: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
     implied: frozenset[str] = frozenset()
 
 
@@ -58,15 +58,15 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     """
     spec = part.declared
     key = "urdf" if spec.urdf is not None else "xacro"
-    at = part.spec.at((*part.at, key))
-    file = packages.path_of(spec.urdf or spec.xacro or "", at)
+    span = part.spec.span_of((*part.path, key))
+    file = packages.path_of(spec.urdf or spec.xacro or "", span)
     files: tuple[str, ...] = (file,)
     bolted = _attachment_arguments(part, read(file)) if spec.macro is not None else {}
     if spec.urdf is not None:
         text = read(file)
         root = read_xml(text, file)
     else:
-        expansion = _expand_part(part, file, at, packages, bolted)
+        expansion = _expand_part(part, file, span, packages, bolted)
         text, files = expansion.text, tuple(dict.fromkeys((file, *expansion.files)))
         root = read_expansion(expansion, file, read)
     converted = robot_of(root, file, packages.asset, files)
@@ -78,7 +78,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
             if macros
             else ""
         )
-        raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
+        raise RejectedError([finding("TF206", f"{file} has no links", span, help=advice)])
     robot = with_hardware(robot)
     if bolted:
         robot = _without_edge(robot, bolted, part)
@@ -87,20 +87,20 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
     )
     digest = hashlib.sha256(text.encode()).hexdigest()
-    found = [
+    findings = [
         finding
         for finding in (*converted.of_elements, *converted.of_blocks)
         if finding.severity == "error"
     ]
-    found += converted.of_files
+    findings += converted.of_files
     robot = replace(
         robot, source_numbers=(), source_data={"urdf": digest}
     )  # its numbers are judged where it is linted
     own = _with_base(replace(robot, ros=part.settings, processes=_own(part)))
     if part.declared.is_alone and part.spec.ros.state_publisher == "stock" and own.base:
-        found += stock_faults(own)
+        findings += stock_faults(own)
         own = with_stock(own)
-    return Foreign(own, files, tuple(found), implied)
+    return Foreign(own, files, tuple(findings), implied)
 
 
 def _with_base(robot: Robot) -> Robot:
@@ -109,13 +109,13 @@ def _with_base(robot: Robot) -> Robot:
 
 
 def _expand_part(
-    part: PartEntry, file: str, at: Span, packages: Packages, bolted: Mapping[str, str]
+    part: PartEntry, file: str, span: Span, packages: Packages, bolted: Mapping[str, str]
 ) -> Expansion:
     disk, spec = packages.disk, part.declared
     if disk is None:
-        raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
+        raise RejectedError([finding("TF001", f"{file}: files cannot be read here", span)])
     args = {
-        name: _with_files(value, (*part.at, "args", name), part, disk)
+        name: _with_files(value, (*part.path, "args", name), part, disk)
         for name, value in spec.args.items()
     }
     return disk.expand(file, packages, args, _use(part, file, packages, disk, bolted))
@@ -123,16 +123,16 @@ def _expand_part(
 
 def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
     """Return a value with each ``${file(PATH)}`` made absolute from the robot file's folder."""
-    at = part.spec.at(path)
+    span = part.spec.span_of(path)
 
     def absolute(call: re.Match[str]) -> str:
-        place = path_named(call[2], at)
+        place = find_path(call[2], span)
         if not (disk.is_file(place) or disk.is_folder(place)):
             message, advice = (
                 f"{call[0]}: {place} does not exist",
                 "paths are relative to the file that contains them",
             )
-            raise RejectedError([finding("TF019", message, at, help=advice)])
+            raise RejectedError([finding("TF019", message, span, help=advice)])
         return str(FilePath(place).absolute())
 
     return OF_FILES.sub(absolute, value) if isinstance(value, str) else value
@@ -187,7 +187,7 @@ def _without_edge(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> R
         )
         message = f"the macro {part.declared.macro} is attached to {parent} by {what}"
         raise RejectedError(
-            [finding("TF313", message, part.spec.at((*part.at, "parent")), help=advice)]
+            [finding("TF313", message, part.spec.span_of((*part.path, "parent")), help=advice)]
         )
     if part.declared.joint is None:
         part.declared = part.declared.model_copy(
@@ -200,27 +200,27 @@ def _use(
     part: PartEntry, file: str, packages: Packages, disk: Disk, bolted: Mapping[str, str]
 ) -> Use:
     """Return how the part uses the file: as a whole, or a call of its macro."""
-    spec, at = part.declared, part.at
+    spec, path = part.declared, part.path
     if spec.macro is None:
-        return Use(part.spec.at((*at, "xacro")))
-    places = (part.spec.at((*at, "include", index)) for index in range(len(spec.include)))
+        return Use(part.spec.span_of((*path, "xacro")))
+    places = (part.spec.span_of((*path, "include", index)) for index in range(len(spec.include)))
     files = (
-        *(packages.path_of(file, place) for file, place in zip(spec.include, places, strict=True)),
+        *(packages.path_of(file, span) for file, span in zip(spec.include, places, strict=True)),
         file,
     )
     parameters: dict[str, str] = {name: value for name, value in bolted.items() if name != _ORIGIN}
     blocks = [bolted[_ORIGIN]] if _ORIGIN in bolted else []
     for name, value in spec.params.items():
         if _is_markup(value):
-            _refuse_broken(name, value, part.spec.at((*at, "params", name)))
+            _refuse_broken(name, value, part.spec.span_of((*path, "params", name)))
         block = _block(value)
         if block is None:
-            parameters[name] = _word(_with_files(value, (*at, "params", name), part, disk))
+            parameters[name] = _word(_with_files(value, (*path, "params", name), part, disk))
         else:
             blocks.append(block)
-    named = {name: part.spec.at_key((*at, "params", name)) for name in spec.params}
+    named = {name: part.spec.key_span((*path, "params", name)) for name in spec.params}
     return Use(
-        part.spec.at((*at, "macro")),
+        part.spec.span_of((*path, "macro")),
         spec.macro,
         parameters,
         blocks=tuple(blocks),
@@ -233,15 +233,15 @@ def _is_markup(value: Any) -> TypeGuard[str]:
     return isinstance(value, str) and value.lstrip().startswith("<")
 
 
-def _refuse_broken(name: str, text: str, at: Span) -> None:
+def _refuse_broken(name: str, text: str, span: Span) -> None:
     try:
-        read_block(text, at.file)
+        read_block(text, span.file)
     except RejectedError as error:
-        found = (
-            replace(finding, span=at, message=f"block {name}: {finding.message}")
+        findings = (
+            replace(finding, span=span, message=f"block {name}: {finding.message}")
             for finding in error.findings
         )
-        raise RejectedError(found) from None
+        raise RejectedError(findings) from None
 
 
 def _block(value: Any) -> str | None:
@@ -267,8 +267,8 @@ def _own(part: PartEntry) -> tuple[Process, ...]:
         Process(
             name,
             name,  # type: ignore[arg-type]  # the built-in processes are called by their kinds
-            at=part.place,
-            ros_nodes=(Node(full_name(settings.namespace, f"tfcompose_{name}"), part.place),),
+            span=part.span,
+            ros_nodes=(Node(full_name(settings.namespace, f"tfcompose_{name}"), part.span),),
             remap=remap,
         )
         for name in BUILT_IN

@@ -25,7 +25,7 @@ def hosts_of(spec: RobotSpec) -> dict[str, Host]:
             host.python,
             host.setup,
             host.node_selector,
-            at=spec.at_key(("hosts", name)),
+            span=spec.key_span(("hosts", name)),
         )
         for name, host in spec.hosts.items()
     }
@@ -42,5 +42,5 @@ def with_host_place(process: Process, spec: RobotSpec) -> Process:
 
     A component that runs where its container does has none.
     """
-    host_at = spec.spans.exactly_at((*entry_of(process, spec), "host"))
+    host_at = spec.spans.exact_span((*entry_of(process, spec), "host"))
     return replace(process, host_at=host_at)

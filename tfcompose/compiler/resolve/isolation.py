@@ -15,10 +15,10 @@ from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.compiler.resolve.processes import full_name
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.model.fields import narrow
-from tfcompose.model.plan import RosSettings, known_at_launch
+from tfcompose.model.plan import RosSettings, is_known_at_launch
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.spec.language.variables import CALLS
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -62,7 +62,7 @@ def isolate(draft: Draft) -> Iterator[Finding]:
             owns = process.name in owners
             moved = _remapped(moved, rules, robot.ros.namespace, owns=owns)
         processes.append(filler.fill(moved))
-    yield from filler.found
+    yield from filler.findings
     draft.robot = replace(robot, processes=tuple(processes))
 
 
@@ -98,21 +98,21 @@ def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     if ros.isolate != "none" and not named:
         message = f"isolate: {ros.isolate} needs a namespace"
         advice = "ros: {namespace: robot1}"
-        yield finding("TF304", message, spec.at(("ros", "isolate")), help=advice)
+        yield finding("TF304", message, spec.span_of(("ros", "isolate")), help=advice)
     for index, frame in enumerate(ros.shared_frames):
         if frame not in robot.frames and not robot.excuses(frame):
             message = f"shared_frames: unknown frame {frame}"
             advice = did_you_mean(frame, robot.frames, "remove it")
-            at = spec.at(("ros", "shared_frames", index))
-            yield finding("TF203", message, at, help=advice)
+            span = spec.span_of(("ros", "shared_frames", index))
+            yield finding("TF203", message, span, help=advice)
 
 
 @dataclass(slots=True)
 class _ProcessFiller:
-    """Fills in processes; ``found`` is what cannot be."""
+    """Fills in processes; ``findings`` is what cannot be."""
 
     draft: Draft
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
     def fill(self, process: Process) -> Process:
         """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
@@ -158,30 +158,33 @@ class _ProcessFiller:
     def _frame(self, frame: str, path: Path) -> str:
         if frame not in self.draft.robot.frames and not self.draft.robot.excuses(frame):
             advice = did_you_mean(frame, self.draft.robot.frames)
-            at = self.draft.spec.at(path)
-            self.found.append(
-                finding("TF203", f"${{frame({frame})}}: unknown frame {frame}", at, help=advice)
+            span = self.draft.spec.span_of(path)
+            self.findings.append(
+                finding("TF203", f"${{frame({frame})}}: unknown frame {frame}", span, help=advice)
             )
         return self.draft.robot.final(frame)
 
     def _file(self, name: str, path: Path) -> str:
-        at = self.draft.spec.at(path)
-        place = path_named(name, at)
+        span = self.draft.spec.span_of(path)
+        place = find_path(name, span)
         if name.startswith("/"):
             advice = (
                 "a path from this file's folder; or write the path alone, which no other"
                 " machine has"
             )
-            self.found.append(
-                finding("TF106", f"${{file({name})}} is an absolute path", at, help=advice)
+            self.findings.append(
+                finding("TF106", f"${{file({name})}} is an absolute path", span, help=advice)
             )
         elif self.draft.disk and not (
             self.draft.disk.is_file(place) or self.draft.disk.is_folder(place)
         ):
             message = f"${{file({name})}}: {place} does not exist"
-            self.found.append(
+            self.findings.append(
                 finding(
-                    "TF019", message, at, help="paths are relative to the file that contains them"
+                    "TF019",
+                    message,
+                    span,
+                    help="paths are relative to the file that contains them",
                 )
             )
         return f"${{file:{place}}}"
@@ -193,12 +196,12 @@ class _ProcessFiller:
         """
         if cwd is None or cwd.startswith(("/", "${")):
             return self._fill(cwd, path)  # type: ignore[no-any-return]
-        at = self.draft.spec.at(path)
-        place = path_named(cwd, at)
+        span = self.draft.spec.span_of(path)
+        place = find_path(cwd, span)
         if self.draft.disk and not self.draft.disk.is_folder(place):
             advice = "paths are relative to the file that contains them"
-            self.found.append(
-                finding("TF019", f"cwd: the folder {place} does not exist", at, help=advice)
+            self.findings.append(
+                finding("TF019", f"cwd: the folder {place} does not exist", span, help=advice)
             )
         return f"${{file:{place}}}"
 
@@ -208,11 +211,11 @@ class _ProcessFiller:
             process.kind == "run" and process.package is not None and len(process.nodes) == 1
         )
         for key, value in node.params.items() if not can else ():
-            if known_at_launch(value):
+            if is_known_at_launch(value):
                 message = (
                     f"the parameter {key} of {process.name} contains a path that is known only at"
                     " the start"
                 )
                 advice = "write it among the arguments of run"
-                place = self.draft.spec.at((*node.path, "params", key))
-                self.found.append(finding("TF816", message, place, help=advice))
+                span = self.draft.spec.span_of((*node.path, "params", key))
+                self.findings.append(finding("TF816", message, span, help=advice))

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.compiler.resolve.hosts import entry_of
-from tfcompose.compiler.resolve.processes import added_process, says_how
+from tfcompose.compiler.resolve.processes import add_process, says_how
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.model.plan import Ready
 from tfcompose.model.plan.middleware import (
@@ -57,12 +57,12 @@ def own_router(spec: RobotSpec) -> list[Process]:
     process = Process(
         ROUTER,
         "run",
-        at=spec.at_key(path),
+        span=spec.key_span(path),
         argv=(ROUTER_PROGRAM,),
         restart="on-failure",
         emulate_tty=True,
     )
-    process = added_process(process, declared, spec)
+    process = add_process(process, declared, spec)
     return [replace(process, ready=process.ready or _READY)]
 
 
@@ -113,32 +113,35 @@ def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     if spec.ros.router and ros.rmw != "zenoh":
         advice = "ros: {rmw: zenoh}, or remove router"
         yield finding(
-            "TF107", "router goes with rmw: zenoh", spec.at_key(("ros", "router")), help=advice
+            "TF107",
+            "router goes with rmw: zenoh",
+            spec.key_span(("ros", "router")),
+            help=advice,
         )
     if ros.rmw is None:
         return
-    yield from _not_supported(robot, spec)
+    yield from _unsupported_settings(robot, spec)
     yield from _disagreeing(robot, spec)
     if ros.rmw == "zenoh":
         yield from _wrong_routers(robot, spec)
 
 
-def _not_supported(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
-    ros, at = robot.ros, spec.at(("ros", "rmw"))
+def _unsupported_settings(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
+    ros, at = robot.ros, spec.span_of(("ros", "rmw"))
     if ros.rmw == "fastdds":
         return
     if robot.guard.mode == "strict" and robot.guard.fence == "partition":
         message = (
             f"guard: {{fence: partition}} needs Fast DDS, and rmw: {ros.rmw} has no partitions"
         )
-        place = spec.at(("guard", "fence")) if spec.spans.has(("guard", "fence")) else at
+        place = spec.span_of(("guard", "fence")) if spec.spans.has(("guard", "fence")) else at
         yield finding(
             "TF870", message, place, help="remove fence: the strict guard then uses remapping"
         )
     if ros.rmw == "zenoh" and ros.discovery == "off":
         message = "rmw: zenoh has no discovery: off: every node that reaches the router is found"
         advice = "discovery: localhost, so that the router accepts only its own computer"
-        yield finding("TF870", message, spec.at(("ros", "discovery")), help=advice)
+        yield finding("TF870", message, spec.span_of(("ros", "discovery")), help=advice)
 
 
 def _disagreeing(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
@@ -152,24 +155,24 @@ def _disagreeing(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
         if own is None or own == wanted:
             continue
         path = (*entry_of(process, spec), "env", _RMW)
-        place = spec.spans.exactly_at(path) or process.at
+        span = spec.spans.exact_span(path) or process.span
         message = f"{process.name} gets {_RMW}={own}, but the robot has rmw: {robot.ros.rmw}"
-        notes = [Note("set here", spec.at(("ros", "rmw")))]
+        notes = [Note("set here", spec.span_of(("ros", "rmw")))]
         advice = (
             f"remove {_RMW} from its env: {process.name} cannot find the other processes with it"
         )
-        yield finding("TF871", message, place, notes=notes, help=advice)
+        yield finding("TF871", message, span, notes=notes, help=advice)
 
 
 def _wrong_routers(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     routers = _routers(robot)
     for more in routers[1:]:
-        notes = [Note(f"{routers[0].name} is defined here", routers[0].at)]
+        notes = [Note(f"{routers[0].name} is defined here", routers[0].span)]
         message = f"{more.name} is a second Zenoh router, in addition to {routers[0].name}"
         yield finding(
             "TF872",
             message,
-            more.at,
+            more.span,
             notes=notes,
             help="remove one: all processes share one router",
         )
@@ -193,4 +196,4 @@ def _wrong_routers(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
             f" {home or 'another computer'}"
         )
         advice = f"ros: {{router: tcp/{address}:7447}}, the address of {home or 'that computer'}"
-        yield finding("TF873", message, spec.at(("ros", "rmw")), help=advice)
+        yield finding("TF873", message, spec.span_of(("ros", "rmw")), help=advice)

@@ -50,20 +50,20 @@ def optics_of(
     made = []
     for stream in dict.fromkeys((*preset.optics, *declared)):
         base, own = preset.optics.get(stream), declared.get(stream)
-        at = ("sensors", sensor.name, "optics", stream)
+        path = ("sensors", sensor.name, "optics", stream)
         pattern = (own.frame if own else None) or (base.frame if base else None)
         if pattern is None:
-            advice = f"frame: {sensor.named(preset.mount)}; {sensor.spec.preset} has "
+            advice = f"frame: {sensor.fill_name(preset.mount)}; {sensor.spec.preset} has "
             advice += f"the streams {', '.join(preset.optics)}" if preset.optics else "no streams"
             yield finding(
-                "TF102", f"the stream {stream} has no frame", spec.at_key(at), help=advice
+                "TF102", f"the stream {stream} has no frame", spec.key_span(path), help=advice
             )
             continue
-        frame = sensor.named(pattern)
+        frame = sensor.fill_name(pattern)
         if own and own.frame and frame not in frames:
             advice = did_you_mean(frame, frames, f"there is {', '.join(frames)}")
-            place = spec.at((*at, "frame"))
-            yield finding("TF203", f"{sensor.name} has no frame {frame}", place, help=advice)
+            span = spec.span_of((*path, "frame"))
+            yield finding("TF203", f"{sensor.name} has no frame {frame}", span, help=advice)
             continue
         if frame not in frames or not (own or base is None or sensor.holds(base.when)):
             continue
@@ -73,12 +73,12 @@ def optics_of(
         if kind is None:
             advice = "kind: camera, lidar, radar or ultrasonic"
             message = f"{preset.kind} sees nothing: the stream {stream} has no kind"
-            yield finding("TF102", message, spec.at_key(at), help=advice)
+            yield finding("TF102", message, spec.key_span(path), help=advice)
             continue
-        place = spec.at_key(at) if own else spec.at_key(at[:2])
-        values, sources = _merge_optics(base, own, str(spec.at_key(at)))
+        span = spec.key_span(path) if own else spec.key_span(path[:2])
+        values, sources = _merge_optics(base, own, str(spec.key_span(path)))
         values.setdefault("active", kind != "camera")
-        made.append(Optics(stream, renamed(frame), kind, place, sources=tuple(sources), **values))
+        made.append(Optics(stream, renamed(frame), kind, span, sources=tuple(sources), **values))
     return tuple(made)
 
 

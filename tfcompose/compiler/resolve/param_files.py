@@ -42,13 +42,13 @@ def read_param_files(draft: Draft) -> Iterator[Finding]:
     if work.digests:
         source_data["parameter files"] = work.digests
     draft.robot = replace(robot, processes=tuple(processes), source_data=source_data)
-    yield from work.found
+    yield from work.findings
 
 
 @dataclass(slots=True)
 class _ParamFiles:
     draft: Draft
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
     _known: dict[str, ParamsFile] = field(default_factory=dict)
 
@@ -71,21 +71,21 @@ class _ParamFiles:
             sections[_ANY] = _merge_params(sections.get(_ANY, {}), common)
         files = list(self._load_files(node, named))
         without = []
-        for path, place, content in files:
+        for path, span, content in files:
             _add_sections(sections, content)
             for_node = any(matches(section.name, node.name) for section in content.nodes)
-            if not for_node and not content.found and not process.loads:
-                without.append(_nothing(path, place, node, process, content.nodes))
+            if not for_node and not content.findings and not process.loads:
+                without.append(_nothing(path, span, node, process, content.nodes))
         if len(without) == len(files):
             # A file that all nodes are given need not have something for each.
-            self.found += without
+            self.findings += without
         params_here: dict[str, Any] = {}
         for name, params in sections.items():
             if matches(name, node.name):
                 params_here = _merge_params(params_here, params)
             others[name] = _merge_params(others.get(name, {}), _words(params))
         places |= {
-            key: (named[value.at.file], value.at)
+            key: (named[value.span.file], value.span)
             for key, value in params_here.items()
             if isinstance(value, Word)
         }
@@ -98,7 +98,7 @@ class _ParamFiles:
         for key in node.params:
             path = (*node.path, "params", key)
             if self.draft.spec.spans.has_key(path):
-                places[key] = (self.draft.spec.at_key(path),)
+                places[key] = (self.draft.spec.key_span(path),)
         return {
             key: value for key, value in node.params.items() if not (has_files and key == FILE_KEY)
         }
@@ -107,49 +107,53 @@ class _ParamFiles:
         self, node: Node, named: dict[str, Span]
     ) -> Iterator[tuple[str, Span, ParamsFile]]:
         """Yield the files that a node names; ``named`` takes where each is named."""
-        for file, place in self._files_of(node):
+        for file, span in self._files_of(node):
             if not isinstance(file, str) or not file:
-                self.found.append(finding("TF103", "params: file takes the names of files", place))
-            elif loaded := self._load(file, place):
+                self.findings.append(
+                    finding("TF103", "params: file takes the names of files", span)
+                )
+            elif loaded := self._load(file, span):
                 path, content = loaded
-                named[path] = place
-                yield path, place, content
+                named[path] = span
+                yield path, span, content
 
     def _files_of(self, node: Node) -> list[tuple[Any, Span]]:
         """Return the parameter files that a node names, each with the place of its name."""
         if not names_files(node.params):
             return []
-        named, at = node.params[FILE_KEY], (*node.path, "params", FILE_KEY)
+        named, path = node.params[FILE_KEY], (*node.path, "params", FILE_KEY)
         paths = (
-            [(named, at)]
+            [(named, path)]
             if isinstance(named, str)
-            else [(file, (*at, i)) for i, file in enumerate(named)]
+            else [(file, (*path, i)) for i, file in enumerate(named)]
         )
-        return [(file, self.draft.spec.at(path)) for file, path in paths]
+        return [(file, self.draft.spec.span_of(path)) for file, path in paths]
 
-    def _load(self, file: str, at: Span) -> tuple[str, ParamsFile] | None:
+    def _load(self, file: str, span: Span) -> tuple[str, ParamsFile] | None:
         """Return the path of a file that is named here, and what it holds."""
         call = OF_FILES.fullmatch(file)
         try:
-            path = self.draft.packages.path_of(call[2] if call else file, at)
+            path = self.draft.packages.path_of(call[2] if call else file, span)
         except RejectedError as error:
-            self.found += error.findings
+            self.findings += error.findings
             return None
         if path in self._known:
             return path, self._known[path]
-        note = Note("named here", at)
+        note = Note("named here", span)
         if self.draft.read is None:
-            self.found.append(finding("TF001", f"{path}: files cannot be read here", at))
+            self.findings.append(finding("TF001", f"{path}: files cannot be read here", span))
             return None
         try:
             text = self.draft.read(path)
             loaded = load_params(text, path)
         except RejectedError as error:
-            self.found += [
+            self.findings += [
                 replace(finding, notes=(*finding.notes, note)) for finding in error.findings
             ]
             return None
-        self.found += [replace(finding, notes=(*finding.notes, note)) for finding in loaded.found]
+        self.findings += [
+            replace(finding, notes=(*finding.notes, note)) for finding in loaded.findings
+        ]
         self.digests[path] = hashlib.sha256(text.encode()).hexdigest()
         self._known[path] = loaded
         return path, loaded
@@ -166,18 +170,18 @@ def _add_sections(sections: dict[str, dict[str, Any]], content: ParamsFile) -> N
 
 
 def _nothing(
-    path: str, at: Span, node: Node, process: Process, there: Sequence[NodeParams]
+    path: str, span: Span, node: Node, process: Process, there: Sequence[NodeParams]
 ) -> Finding:
     names = [section.name for section in there]
     near = nearest(node.name.rpartition("/")[2], [name.rpartition("/")[2] for name in names])
     likely = next((section for section in there if near and section.name.endswith(near)), None)
-    notes = [Note(f"it has {likely.name}", likely.at)] if likely else []
+    notes = [Note(f"it has {likely.name}", likely.span)] if likely else []
     advice = (
         f"call it {node.name} there (/** means any node), or give the process that node: it has"
         f" {', '.join(names) or 'no node'}"
     )
     message = f"{path} has no parameters for {node.name}, the node of {process.name}"
-    return finding("TF334", message, at, help=advice, notes=notes, severity="warning")
+    return finding("TF334", message, span, help=advice, notes=notes, severity="warning")
 
 
 def matches(pattern: str, name: str) -> bool:

@@ -48,17 +48,17 @@ class PartEntry:
     declared: PartSpec
     spec: RobotSpec
     outer_prefix: str
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
     @property
-    def at(self) -> Path:
+    def path(self) -> Path:
         """Where it is written."""
         return ("parts", self.name)
 
     @property
-    def place(self) -> Span:
+    def span(self) -> Span:
         """The place of its name."""
-        return self.spec.at_key(self.at)
+        return self.spec.key_span(self.path)
 
     @property
     def prefix(self) -> str:
@@ -93,9 +93,9 @@ class PartEntry:
 
     def given_args(self) -> dict[str, GivenArg]:
         """Return the values that the holder gives the part's arguments."""
-        at = (*self.at, "args")
+        path = (*self.path, "args")
         return {
-            name: GivenArg(value, self.spec.at((*at, name)))
+            name: GivenArg(value, self.spec.span_of((*path, name)))
             for name, value in self.declared.args.items()
         }
 
@@ -109,24 +109,24 @@ class PartEntry:
             ),
             "isolate": self.isolate,
         }
-        source, found = as_part(
-            inner, self.spec.spans, self.at, self.spec.ros, settings, self.declared.vars
+        source, findings = as_part(
+            inner, self.spec.spans, self.path, self.spec.ros, settings, self.declared.vars
         )
-        self.found += found
+        self.findings += findings
         return source
 
-    def joined(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
+    def join(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
         """Return the part under the names that it has in the holder.
 
         ``implied`` are frames that only that has.
         """
         if not _PREFIX.fullmatch(self.prefix):
-            at, advice = (
-                self.spec.at((*self.at, "prefix")),
+            span, advice = (
+                self.spec.span_of((*self.path, "prefix")),
                 "letters, digits and _: left_, or left/",
             )
             raise RejectedError(
-                [finding("TF501", f"invalid prefix {self.prefix!r}", at, help=advice)]
+                [finding("TF501", f"invalid prefix {self.prefix!r}", span, help=advice)]
             )
         shared = frozenset(robot.ros.shared_frames) & robot.frames.keys() | implied
         if self.declared.root is not None:
@@ -134,10 +134,10 @@ class PartEntry:
         names = Names(self.name, self.prefix, shared, self.declared.is_alone)
         again = rename_robot(robot, names)
         if self.declared.owner is not None:
-            at = self.spec.at((*self.at, "owner"))
+            span = self.spec.span_of((*self.path, "owner"))
             again = replace(
                 again,
-                edges=tuple(_with_owner(edge, self.declared.owner, at) for edge in again.edges),
+                edges=tuple(_with_owner(edge, self.declared.owner, span) for edge in again.edges),
             )
         if self.declared.is_alone:
             again = replace(again, parts=(Part(self.name, self.prefix, robot), *again.parts))
@@ -148,9 +148,12 @@ class PartEntry:
         if root not in robot.frames:
             if robot.excuses(root):
                 raise RejectedError([])
-            at, advice = self.spec.at((*self.at, "root")), did_you_mean(root, robot.frames)
+            span, advice = (
+                self.spec.span_of((*self.path, "root")),
+                did_you_mean(root, robot.frames),
+            )
             raise RejectedError(
-                [finding("TF203", f"the part {self.name} has no frame {root}", at, help=advice)]
+                [finding("TF203", f"the part {self.name} has no frame {root}", span, help=advice)]
             )
         return subtree(robot, root)
 
@@ -167,19 +170,19 @@ class PartEntry:
         held = (edge.parent for edge in robot.edges if edge.parent in names.shared)
         listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
         what = f"has several roots: {listed}" if roots else f"is a child of {listed} already"
-        at = self.spec.at((*self.at, "parent"))
+        span = self.spec.span_of((*self.path, "parent"))
         advice = (
             f"choose one: root: {roots[0]}"
             if roots
             else "leave parent out, or take a part of it: root: FRAME"
         )
-        raise RejectedError([finding("TF313", f"the part {self.name} {what}", at, help=advice)])
+        raise RejectedError([finding("TF313", f"the part {self.name} {what}", span, help=advice)])
 
 
-def _with_owner(edge: Edge, owner: str, at: Span) -> Edge:
+def _with_owner(edge: Edge, owner: str, span: Span) -> Edge:
     """Return the edge as another owner sends it: fixed on /tf_static, moving on /tf."""
     return replace(
-        edge, owner=owner, owner_at=at, kind="static" if edge.kind == "static" else "dynamic"
+        edge, owner=owner, owner_at=span, kind="static" if edge.kind == "static" else "dynamic"
     )
 
 
@@ -197,7 +200,7 @@ def subtree(robot: Robot, root: str) -> Robot:
     unused = {sensor.driver for sensor in robot.sensors} - busy
     return replace(
         robot,
-        frames={name: at for name, at in robot.frames.items() if name in frames},
+        frames={name: span for name, span in robot.frames.items() if name in frames},
         edges=edges,
         links={name: link for name, link in robot.links.items() if name in frames},
         processes=tuple(process for process in robot.processes if process.name not in unused),

@@ -17,7 +17,7 @@ from tfcompose.compiler.resolve.part import PartEntry
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.model.robot import STATIC
 from tfcompose.spec.language import Given, compose, load_named, validate, with_includes
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -44,11 +44,11 @@ def join(draft: Draft, resolve: Resolve) -> Iterator[Finding]:
     for name, declared in spec.parts.items():
         part = PartEntry(name, declared, spec, outer_prefix=prefix)
         try:
-            draft.joined.append(part.joined(*_robot_of(part, draft, resolve)))
+            draft.joined.append(part.join(*_robot_of(part, draft, resolve)))
         except RejectedError as error:
-            part.found += error.findings
+            part.findings += error.findings
             draft.broken |= {("parts", f"{name}/"), ("parts", part.prefix)}
-        yield from part.found
+        yield from part.findings
     draft.broken.update(*(part.robot.broken for part in draft.joined))
 
 
@@ -57,39 +57,41 @@ def _robot_of(part: PartEntry, draft: Draft, resolve: Resolve) -> tuple[Robot, f
     draft.collected.count += 1
     if draft.read is None or draft.collected.count > MOST_PARTS:
         message = f"more than {MOST_PARTS} parts" if draft.read else "files cannot be read here"
-        raise RejectedError([finding("TF008", message, part.place)])
+        raise RejectedError([finding("TF008", message, part.span)])
     if part.declared.spec is part.declared.urdf is part.declared.xacro is None:
         raise RejectedError([])  # it was refused already
-    if part.declared.xacro is not None and part.at in draft.validated.broken:
+    if part.declared.xacro is not None and part.path in draft.validated.broken:
         raise RejectedError([])  # and so were arguments, which xacro would miss
     try:
         if part.declared.spec is not None:
             validated = _validate_part(part, part.declared.spec, draft, draft.read)
             inner, findings = resolve(validated, draft.library, draft.read, draft.disk, draft)
-            part.found += [_with_note(finding, part) for finding in (*validated.found, *findings)]
+            part.findings += [
+                _with_note(finding, part) for finding in (*validated.findings, *findings)
+            ]
             return inner.robot, frozenset()
         made = foreign(part, draft.packages, draft.read)
     except RejectedError as error:
         raise RejectedError([_with_note(finding, part) for finding in error.findings]) from None
     for file in made.files:
         draft.collected.notes.setdefault(file, []).append(_note(part))
-    part.found += [_with_note(finding, part) for finding in made.found]
+    part.findings += [_with_note(finding, part) for finding in made.findings]
     return made.robot, made.implied
 
 
 def _validate_part(part: PartEntry, named: str, draft: Draft, read: Reader) -> Validated:
     """Return a robot file that is a part, with what its holder says laid over it."""
-    at = part.spec.at((*part.at, "spec"))
-    file = path_named(named, at)
+    span = part.spec.span_of((*part.path, "spec"))
+    file = find_path(named, span)
     if file in draft.files:
         circle = " → ".join([*draft.files[draft.files.index(file) :], file])
-        raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", at)])
+        raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", span)])
     loaded = with_includes(load_named(read(file), file), read)
     draft.collected.notes.setdefault(file, []).append(_note(part))
     inputs = Given(part.given_args(), draft.validated.given.environment)
     source = compose(loaded, part.declared.profiles, given=inputs)
     validated = validate(part.overlay_on(source), None, inputs)
-    part.found += _useless(part, file, validated)
+    part.findings += _useless(part, file, validated)
     draft.collected.allows += validated.source.allows
     draft.collected.sources.append(validated.source)
     return validated
@@ -112,24 +114,24 @@ def take(draft: Draft) -> Iterator[Finding]:
 
 
 def _take(draft: Draft, part: Joined) -> Iterator[Finding]:
-    robot, keys, at = part.robot, part.declared, ("parts", part.name)
+    robot, keys, path = part.robot, part.declared, ("parts", part.name)
     draft.joints |= _joints_of(part)
-    for name, place in robot.frames.items():
-        draft.frames.setdefault(name, place)
+    for name, span in robot.frames.items():
+        draft.frames.setdefault(name, span)
     for name, link in robot.links.items():
         draft.links.setdefault(name, link)
     if keys.parent is not None and part.root is not None:
         switched = len(keys.parent) > 1  # then the part's owner is who carries it about
         owner = keys.owner if switched else STATIC
-        yield from add_edge(draft, at, part.root, keys, joint_name=keys.joint, owner=owner)
-    draft.edges += [replace(edge, entry=(*at, *edge.entry)) for edge in robot.edges]
+        yield from add_edge(draft, path, part.root, keys, joint_name=keys.joint, owner=owner)
+    draft.edges += [replace(edge, entry=(*path, *edge.entry)) for edge in robot.edges]
     draft.sensors += robot.sensors
 
 
 def _joints_of(part: Joined) -> dict[str, Span]:
     """Return the named joints of a part, which those of one beside others are not among."""
     named = [edge for edge in part.robot.edges if edge.joint_name and not part.declared.is_alone]
-    return {edge.joint_name: edge.joint_at or edge.at for edge in named}
+    return {edge.joint_name: edge.joint_at or edge.span for edge in named}
 
 
 def _name_clash(draft: Draft, part: Joined) -> Finding | None:
@@ -161,16 +163,16 @@ def _names_twice(  # noqa: PLR0913, PLR0917 (what is there, where, and who bring
         if not (keys.prefix or keys.root or names[1:] or first == part.root):
             advice = f"root: {first}, if the part begins there; or {advice}"
     message = f"the part {part.name} brings the {kind} {first}{more}, which already exists"
-    place = spec.at_key(("parts", part.name))
-    return finding("TF505", message, place, notes=notes, help=advice)
+    span = spec.key_span(("parts", part.name))
+    return finding("TF505", message, span, notes=notes, help=advice)
 
 
-def _with_note(found: Finding, part: PartEntry) -> Finding:
-    return replace(found, notes=(*found.notes, _note(part)))
+def _with_note(finding: Finding, part: PartEntry) -> Finding:
+    return replace(finding, notes=(*finding.notes, _note(part)))
 
 
 def _note(part: PartEntry) -> Note:
-    return Note(f"as the part {part.name}", part.place)
+    return Note(f"as the part {part.name}", part.span)
 
 
 def _useless(part: PartEntry, file: str, validated: Validated) -> Iterator[Finding]:
@@ -181,7 +183,7 @@ def _useless(part: PartEntry, file: str, validated: Validated) -> Iterator[Findi
     ]
     for section, name in validated.unused:
         if section == "vars" and name in variables and name not in known:
-            at = part.spec.at_key((*part.at, "vars", name))
+            span = part.spec.key_span((*part.path, "vars", name))
             advice = did_you_mean(name, known, "remove it")
             message = f"{file} does not use the variable {name}"
-            yield finding("TF105", message, at, help=advice)
+            yield finding("TF105", message, span, help=advice)

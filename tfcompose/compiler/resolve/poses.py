@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
-from tfcompose.foundation.text import listed
-from tfcompose.model.robot import STATIC, is_optical, left_out_by, may_be_refused
+from tfcompose.foundation.text import list_names
+from tfcompose.model.robot import STATIC, advise_left_out, is_optical, may_be_refused
 from tfcompose.spec.language.pose import ROTATIONS
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def solve_poses(draft: Draft) -> Iterator[Finding]:
     )
     solver = _Solver(draft, draft.edges, excuses)
     draft.edges = solver.solve()
-    yield from solver.found
+    yield from solver.findings
 
 
 #: How deep a chain of poses that are given relative to each other is followed before it is solved
@@ -90,16 +90,16 @@ class _DeeperError(Exception):
 
 
 class _UnsolvableError(Exception):
-    """A pose cannot be solved; ``found`` is None if that follows from a refused entry."""
+    """A pose cannot be solved; ``finding`` is None if that follows from a refused entry."""
 
-    def __init__(self, found: Finding | None) -> None:
-        self.found = found
-        super().__init__(found)
+    def __init__(self, finding: Finding | None) -> None:
+        self.finding = finding
+        super().__init__(finding)
 
 
 @dataclass(slots=True)
 class _Solver:
-    """Solves the edges of one draft, by index; ``found`` holds what could not be solved.
+    """Solves the edges of one draft, by index; ``findings`` holds what could not be solved.
 
     ``excuses`` tells of a frame whether it, or the edge above it, may be missing because an entry
     was refused.
@@ -108,7 +108,7 @@ class _Solver:
     draft: Draft
     edges: list[Edge]
     excuses: Callable[[str], bool]
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
     _open: list[int] = field(default_factory=list)
     _above: dict[str, int] = field(default_factory=dict)
@@ -129,13 +129,13 @@ class _Solver:
                     else:
                         waiting.append(deeper.index)
                 except _UnsolvableError as error:
-                    self._give_up(waiting.pop(), error.found)
+                    self._give_up(waiting.pop(), error.finding)
                 self._open.clear()
         return [self._solved[index] for index in range(len(self.edges))]
 
-    def _give_up(self, index: int, found: Finding | None) -> None:
-        if found and found not in self.found:
-            self.found.append(found)
+    def _give_up(self, index: int, finding: Finding | None) -> None:
+        if finding and finding not in self.findings:
+            self.findings.append(finding)
         self._solved[index] = replace(self.edges[index], calibration=None)
 
     def _edge(self, index: int) -> Edge:
@@ -155,9 +155,9 @@ class _Solver:
         self._solved[index] = edge
         return edge
 
-    def _at(self, index: int, key: str) -> Span:
+    def _span_of(self, index: int, key: str) -> Span:
         """Return the place of the value of a key of an edge."""
-        return self.draft.spec.at((*self.edges[index].entry, key))
+        return self.draft.spec.span_of((*self.edges[index].entry, key))
 
     def _is_broken(self, index: int) -> bool:
         """Whether something in the entry that gives the edge was refused."""
@@ -168,23 +168,27 @@ class _Solver:
         edge, place = self.edges[index], place_of(keys)
         pose = edge.pose
         if keys.relative_to:
-            at = self._at(index, "relative_to")
-            pose = self._between(edge.parent, self._known_frame(keys.relative_to, at), at) @ pose
+            span = self._span_of(index, "relative_to")
+            pose = (
+                self._between(edge.parent, self._known_frame(keys.relative_to, span), span) @ pose
+            )
         if place:
-            at = self._at(index, "place")
+            span = self._span_of(index, "place")
             inside = self._inside(edge) if edge.sensor and not self._is_broken(index) else None
-            pose = pose @ self._below(index, self._known_frame(place, at, inside), at).inverse()
+            pose = (
+                pose @ self._below(index, self._known_frame(place, span, inside), span).inverse()
+            )
         return pose
 
     def _calibrate(self, index: int, measured: Calibration, keys: EdgeKeys) -> Edge:
         """Return the edge with its calibrated pose and its nominal one."""
-        edge, at = self.edges[index], measured.named_at
+        edge, span = self.edges[index], measured.named_at
         above = below = Pose()
         if measured.parent != edge.parent:
-            above = self._between(edge.parent, measured.parent, at)
+            above = self._between(edge.parent, measured.parent, span)
         if measured.child != edge.child:
             is_place = measured.child == place_of(keys)
-            below_at = self._at(index, "place") if is_place else at
+            below_at = self._span_of(index, "place") if is_place else span
             below = self._below(index, measured.child, below_at)
         if (ROTATIONS | {"xyz"}) & keys.model_fields_set:
             nominal = above.inverse() @ self._declared_pose(index, keys) @ below
@@ -196,17 +200,17 @@ class _Solver:
         group = group_of(edge)
         return [other.child for other in self.edges if group_of(other) == group]
 
-    def _known_frame(self, frame: str, at: Span, inside: list[str] | None = None) -> str:
+    def _known_frame(self, frame: str, span: Span, inside: list[str] | None = None) -> str:
         """Return the frame, which must be one of ``inside``, those that nobody else brings."""
         if frame in self.draft.frames:
             return frame
         if self.excuses(frame) and not inside:
             raise _UnsolvableError(None)
-        otherwise = f"one of: {listed(inside)}" if inside else ""
-        advice = left_out_by(self.draft.validated.conditions, frame) or did_you_mean(
+        otherwise = f"one of: {list_names(inside)}" if inside else ""
+        advice = advise_left_out(self.draft.validated.conditions, frame) or did_you_mean(
             frame, inside or self.draft.frames, otherwise
         )
-        raise _UnsolvableError(finding("TF203", f"unknown frame {frame}", at, help=advice))
+        raise _UnsolvableError(finding("TF203", f"unknown frame {frame}", span, help=advice))
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
         """Return the frame and its ancestors, each with the index of its edge (the root: −1)."""
@@ -216,7 +220,7 @@ class _Solver:
             frame = self.edges[self._above[frame]].parent
         return [*chain.items(), (frame, -1)]
 
-    def _between(self, a: str, b: str, at: Span) -> Pose:
+    def _between(self, a: str, b: str, span: Span) -> Pose:
         """Return the pose of b in a, through fixed edges."""
         up_a, up_b = self._chain(a), self._chain(b)
         ancestors = {frame for frame, _ in up_a}
@@ -227,10 +231,10 @@ class _Solver:
             message = (
                 f"{b} and {a} are in two trees, so the pose of the one in the other is not known"
             )
-            raise _UnsolvableError(finding("TF404", message, at))
-        return self._down(up_a, meeting, at).inverse() @ self._down(up_b, meeting, at)
+            raise _UnsolvableError(finding("TF404", message, span))
+        return self._down(up_a, meeting, span).inverse() @ self._down(up_b, meeting, span)
 
-    def _down(self, chain: list[tuple[str, int]], top: str, at: Span) -> Pose:
+    def _down(self, chain: list[tuple[str, int]], top: str, span: Span) -> Pose:
         """Return the pose of the chain's first frame in ``top``."""
         pose = Pose()
         for frame, index in chain:
@@ -242,7 +246,7 @@ class _Solver:
             if edge.kind != "static" and not (
                 edge.sensor and not edge.given
             ):  # a driver may send it again and again
-                note = Note(f"{edge.name} is published by {edge.owner}", edge.at)
+                note = Note(f"{edge.name} is published by {edge.owner}", edge.span)
                 what = (
                     f"the joint {edge.joint.name} moves"
                     if edge.joint
@@ -250,7 +254,7 @@ class _Solver:
                 )
                 advice = "name a frame with only fixed edges on the way to it"
                 message = f"{what}, so the pose cannot be solved"
-                raise _UnsolvableError(finding("TF404", message, at, notes=[note], help=advice))
+                raise _UnsolvableError(finding("TF404", message, span, notes=[note], help=advice))
             if not edge.pose_known and edge.owner == STATIC:
                 raise _UnsolvableError(None)  # TF605 says so
             if not edge.pose_known:
@@ -258,11 +262,11 @@ class _Solver:
                     f"only {edge.owner} knows where {edge.child} is, so the pose cannot be solved"
                 )
                 advice = _values_of(edge)
-                raise _UnsolvableError(finding("TF404", message, at, help=advice))
+                raise _UnsolvableError(finding("TF404", message, span, help=advice))
             pose = self._edge(index).pose @ pose
         return pose
 
-    def _below(self, index: int, place: str, at: Span) -> Pose:
+    def _below(self, index: int, place: str, span: Span) -> Pose:
         """Return the pose of ``place`` in the edge's child, which must be above it."""
         chain = self._chain(place)
         names = [frame for frame, _ in chain]
@@ -277,9 +281,9 @@ class _Solver:
                 else f"{place} is not below {mount}"
             )
             inside = self._inside(outer)
-            advice = did_you_mean(place, inside, f"one of: {listed(inside)}")
-            raise _UnsolvableError(finding("TF404", message, at, help=advice))
-        pose = self._down(chain, mount, at)
+            advice = did_you_mean(place, inside, f"one of: {list_names(inside)}")
+            raise _UnsolvableError(finding("TF404", message, span, help=advice))
+        pose = self._down(chain, mount, span)
         inner = [self.edges[step] for _, step in chain[: names.index(mount)]]
         nominal = [edge for edge in inner if edge.nominal and edge.owner != STATIC]
         if nominal and not is_broken:
@@ -289,20 +293,20 @@ class _Solver:
                 " unit's own values"
             )
             advice = _values_of(edge)
-            self.found.append(finding("TF405", message, at, help=advice))
+            self.findings.append(finding("TF405", message, span, help=advice))
         return pose
 
     def _circle(self, indexes: list[int]) -> Finding:
         edges = [self.edges[index] for index in indexes]
-        at = edges[0].at
+        span = edges[0].span
         for index in reversed(indexes):
             keys = self.draft.keys.get(index)
             if keys and keys.relative_to:
-                at = self._at(index, "relative_to")
+                span = self._span_of(index, "relative_to")
             elif place_of(keys):
-                at = self._at(index, "place")
+                span = self._span_of(index, "place")
         names = ", ".join(edge.name for edge in edges)
-        return finding("TF404", f"these poses are given relative to each other: {names}", at)
+        return finding("TF404", f"these poses are given relative to each other: {names}", span)
 
 
 def _values_of(edge: Edge) -> str:

@@ -24,7 +24,7 @@ from tfcompose.foundation.findings import (
 )
 from tfcompose.spec.language import load_named, validate_file, validate_preset
 from tfcompose.spec.language.node_preset import NodePresetSpec
-from tfcompose.spec.language.overlay import extended_by, lay_over, without
+from tfcompose.spec.language.overlay import extended_preset, lay_over, without
 from tfcompose.spec.language.preset import PresetSpec
 from tfcompose.spec.load import load
 
@@ -53,7 +53,7 @@ class Sensor:
     options: dict[str, Any]
     tf: str = TFCOMPOSE
 
-    def named(self, pattern: str) -> str:
+    def fill_name(self, pattern: str) -> str:
         """Return a preset's name with the sensor's in it."""
         return fill_name(pattern, self.name, self.preset.words)
 
@@ -64,7 +64,7 @@ class Sensor:
     def frames(self) -> dict[str, PresetFrame]:
         """Return the frames that this sensor has, by their final names before any renaming."""
         return {
-            self.named(name): frame
+            self.fill_name(name): frame
             for name, frame in self.preset.frames.items()
             if self.holds(frame.when)
         }
@@ -77,11 +77,11 @@ class Sensor:
         own = self.spec.frames.get(name)
         if own and own.parent:
             return own.parent
-        return self.named(
+        return self.fill_name(
             frame.by_driver.parent if frame.by_driver and self.tf == DRIVER else frame.parent
         )
 
-    def driven(self) -> dict[str, PresetFrame]:
+    def driver_frames(self) -> dict[str, PresetFrame]:
         """Return those of its frames that the driver can publish."""
         return {name: frame for name, frame in self.frames().items() if frame.driver}
 
@@ -111,11 +111,11 @@ def sensor_of(
     name: str, declared: SensorSpec, library: Library, spec: RobotSpec
 ) -> Generator[Finding, None, Sensor | None]:
     """Return the sensor with its preset and options, or None where it has none."""
-    at: Path = ("sensors", name)
-    span = spec.at((*at, "preset"))
+    path: Path = ("sensors", name)
+    span = spec.span_of((*path, "preset"))
     try:
         plain = library.get(declared.preset)
-        options, refusals = decide_options(plain, declared, at, spec)
+        options, refusals = decide_options(plain, declared, path, spec)
         choices = {
             key: options[key] for key, option in plain.options.items() if option.type == "choice"
         }
@@ -174,19 +174,19 @@ def _publisher(sensor: Sensor) -> str:
     driver, own = sensor.preset.driver, sensor.spec.driver
     if driver is None or (own and own.process == "none"):
         return TFCOMPOSE
-    if not sensor.driven():
+    if not sensor.driver_frames():
         return TFCOMPOSE
     return sensor.spec.tf or driver.tf
 
 
 def decide_options(
-    preset: PresetSpec, declared: SensorSpec, at: Path, spec: RobotSpec
+    preset: PresetSpec, declared: SensorSpec, path: Path, spec: RobotSpec
 ) -> tuple[dict[str, Any], list[Finding]]:
     """Return the values of the preset's options, and what is wrong with those given."""
     options = {key: option.default for key, option in preset.options.items()}
-    found = []
+    findings = []
     for key, value in declared.options.items():
-        place = spec.at((*at, "options", key))
+        span = spec.span_of((*path, "options", key))
         if key not in preset.options:
             there = (
                 f"{declared.preset} has {', '.join(preset.options)}"
@@ -194,17 +194,17 @@ def decide_options(
                 else f"{declared.preset} has none"
             )
             advice = did_you_mean(key, preset.options, there)
-            found.append(
-                finding("TF603", f"{declared.preset} has no option {key}", place, help=advice)
+            findings.append(
+                finding("TF603", f"{declared.preset} has no option {key}", span, help=advice)
             )
             continue
         chosen = _as_text(value) if preset.options[key].type == "choice" else value
-        refusal = _refusal(preset.options[key], key, chosen, place)
+        refusal = _refusal(preset.options[key], key, chosen, span)
         if refusal:
-            found.append(refusal)
+            findings.append(refusal)
         else:
             options[key] = chosen
-    return options, found
+    return options, findings
 
 
 def _as_text(value: Any) -> Any:
@@ -214,27 +214,27 @@ def _as_text(value: Any) -> Any:
     return f"{value:g}" if isinstance(value, (int, float)) else value
 
 
-def _refusal(option: PresetOption, key: str, value: Any, place: Span) -> Finding | None:
+def _refusal(option: PresetOption, key: str, value: Any, span: Span) -> Finding | None:
     if option.type == "bool" and not isinstance(value, bool):
-        return finding("TF603", f"the option {key} is {value!r}", place, help="true or false")
+        return finding("TF603", f"the option {key} is {value!r}", span, help="true or false")
     if option.type == "text" and not isinstance(value, str):
         return finding(
-            "TF603", f"the option {key} is {value!r}, not a string", place, help="put it in quotes"
+            "TF603", f"the option {key} is {value!r}, not a string", span, help="put it in quotes"
         )
     if option.type == "choice" and value not in option.variants:
         advice = did_you_mean(str(value), option.variants, f"one of: {', '.join(option.variants)}")
-        return finding("TF603", f"the option {key} cannot be {value!r}", place, help=advice)
+        return finding("TF603", f"the option {key} cannot be {value!r}", span, help=advice)
     if option.type != "set":
         return None
     known = ", ".join(option.values)
     if not isinstance(value, list):
         return finding(
-            "TF603", f"the option {key} is not a list", place, help=f"a list of some of: {known}"
+            "TF603", f"the option {key} is not a list", span, help=f"a list of some of: {known}"
         )
     for item in value:
         if item not in option.values:
             advice = did_you_mean(str(item), option.values, f"there is {known}")
-            return finding("TF603", f"the option {key} cannot hold {item!r}", place, help=advice)
+            return finding("TF603", f"the option {key} cannot hold {item!r}", span, help=advice)
     return None
 
 
@@ -330,12 +330,14 @@ class Library:
         return self._specs[name, options]
 
     def _extend(self, own: Source, name: str, deep: int) -> Source:
-        base = extended_by(own)
+        base = extended_preset(own)
         if base is None:
             return own
-        at = own.at(("extends",))
+        span = own.span_of(("extends",))
         if deep > _DEEPEST:
-            raise RejectedError([finding("TF606", f"{name} extends itself, by way of others", at)])
+            raise RejectedError(
+                [finding("TF606", f"{name} extends itself, by way of others", span)]
+            )
         if base == name:  # it stands before one of the same name, and changes it
             later = self._later(own.file)
             below = (
@@ -347,7 +349,7 @@ class Library:
             below = self.source(base, deep + 1) if self.file(base) else None
         if below is None:
             raise RejectedError(
-                [finding("TF606", f"{name} extends {base}, which does not exist", at)]
+                [finding("TF606", f"{name} extends {base}, which does not exist", span)]
             )
         return lay_over(without(below, "extends"), own, is_overlay=False, of=PresetSpec)
 
@@ -422,13 +424,13 @@ def is_node_preset(name: str) -> bool:
     return True
 
 
-def unknown_node_preset(name: str, at: Span) -> Finding:
+def unknown_node_preset(name: str, span: Span) -> Finding:
     """Return the finding for a name that no preset of a node has."""
     names = node_preset_names()
     return finding(
         "TF601",
         f"unknown node preset {name}",
-        at,
+        span,
         help=did_you_mean(name.rpartition("/")[2], names, f"there is {', '.join(names)}"),
     )
 

@@ -66,30 +66,30 @@ if TYPE_CHECKING:
 def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Finds[Process | None]:
     """Return the process that the user describes, or None where something is missing."""
     spec = validated.spec
-    at: Path = ("processes", name)
-    place = spec.at_key(at)
+    path: Path = ("processes", name)
+    span = spec.key_span(path)
     namespace = namespace_of(declared, spec.ros.namespace)
     nodes = yield from nodes_of(name, declared, namespace, spec)
     has_common = declared.nodes and declared.params
-    common = Node("/**", place, at, declared.params) if has_common else None
+    common = Node("/**", span, path, declared.params) if has_common else None
     if declared.external:
-        process = Process(name, "external", at=place, ros_nodes=nodes, all_nodes=common)
+        process = Process(name, "external", span=span, ros_nodes=nodes, all_nodes=common)
         return replace(process, **how(declared, namespace, "external"))
     if declared.simulate:
         simulation = yield from _simulation(name, declared.simulate, validated)
         if simulation is None:
             return None
         process = Process(
-            name, "simulate", at=place, ros_nodes=(Node(nodes[0].name, nodes[0].at),)
+            name, "simulate", span=span, ros_nodes=(Node(nodes[0].name, nodes[0].span),)
         )
         keys = how(declared, namespace, "simulate") | {"simulate": simulation}
         return replace(process, **keys)
     if declared.component and declared.container:
-        process = Process(name, "component", at=place, ros_nodes=nodes)
+        process = Process(name, "component", span=span, ros_nodes=nodes)
         return replace(process, **how(declared, namespace, "component"))
     run = _run_of(declared)
     if run and run.is_startable:
-        process = Process(name, "run", at=place, ros_nodes=nodes, all_nodes=common)
+        process = Process(name, "run", span=span, ros_nodes=nodes, all_nodes=common)
         started = program(run, shell=bool(declared.shell))
         return replace(process, **how(declared, namespace), **started)
     if _is_way_refused(name, validated):
@@ -98,7 +98,7 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
         yield finding(
             "TF102",
             f"{name}: run needs package and executable",
-            spec.at_key((*at, "run")),
+            spec.key_span((*path, "run")),
             help=start_advice(
                 declared.node,
                 "run: {package: …, executable: …}, or {launch: package/file.launch.py}",
@@ -107,13 +107,13 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
         return None
     preset = preset_of(declared.node)
     if preset is not None and not is_node_preset(preset):
-        yield unknown_node_preset(preset, spec.at((*at, "node", "preset")))
+        yield unknown_node_preset(preset, spec.span_of((*path, "node", "preset")))
         return None
     ways = "run: {package: …, executable: …}, component: PACKAGE/CLASS, simulate: {…}"
     yield finding(
         "TF102",
         f"{name} does not say how it runs",
-        place,
+        span,
         help=start_advice(declared.node, f"{ways}, or external: true"),
     )
     return None
@@ -153,7 +153,7 @@ def _simulation(name: str, simulate: Simulate, validated: Validated) -> Finds[Si
         path[:3] == at and path[3:4] and path[3] in SIMULATIONS for path in validated.refused
     ):
         message = f"{name}: simulate needs circle, fixed or joints"
-        yield finding("TF102", message, validated.spec.at_key(at))
+        yield finding("TF102", message, validated.spec.key_span(at))
     return None
 
 
@@ -181,11 +181,11 @@ def check_names(draft: Draft) -> Iterator[Finding]:
     for name, sensor in spec.sensors.items():
         driven_by_it = sensor.driver is not None and sensor.driver.process == name
         if name in spec.processes and not driven_by_it:
-            first[name] = Process(name, "external", at=spec.at_key(("sensors", name)))
+            first[name] = Process(name, "external", span=spec.key_span(("sensors", name)))
     for process in draft.all_processes:
         other = first.setdefault(process.name, process)
-        if other.at != process.at:
-            notes = [Note(f"{other.name} is also defined here", other.at)]
+        if other.span != process.span:
+            notes = [Note(f"{other.name} is also defined here", other.span)]
             advice = "rename one of them"
             if process.name in spec.sensors:
                 advice += f", or, if it drives the sensor, driver: {process.name}"
@@ -193,7 +193,7 @@ def check_names(draft: Draft) -> Iterator[Finding]:
                 f"the name {process.name} is used twice; sensors and processes share one name"
                 " space"
             )
-            yield finding("TF502", message, process.at, notes=notes, help=advice)
+            yield finding("TF502", message, process.span, notes=notes, help=advice)
 
 
 def check_waits(draft: Draft) -> Iterator[Finding]:
@@ -211,14 +211,14 @@ def check_waits(draft: Draft) -> Iterator[Finding]:
             if what == "done" and other in lasting:
                 message = f"{process.name} waits until {other} is done, which never happens"
                 advice = f"after: {{{other}: ready}}, or started"
-                yield finding("TF813", message, spec.at((*path, other)), help=advice)
+                yield finding("TF813", message, spec.span_of((*path, other)), help=advice)
             elif process.component and other == process.component.container:
                 continue  # it was not written here
             elif other not in known | refused and not other.startswith(missing):
                 names = sorted(known - {process.name})
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
                 message = f"{process.name} waits for {other}, which is not a process"
-                yield finding("TF813", message, spec.at_key((*path, other)), help=advice)
+                yield finding("TF813", message, spec.key_span((*path, other)), help=advice)
 
 
 def check_launch_nodes(draft: Draft) -> Iterator[Finding]:
@@ -235,7 +235,7 @@ def check_launch_nodes(draft: Draft) -> Iterator[Finding]:
                 " is not named"
             )
             advice = f"processes: {{{process.name}: {{node: NAME}}}}"
-            yield finding("TF332", message, edge.owner_at or edge.at, help=advice)
+            yield finding("TF332", message, edge.owner_at or edge.span, help=advice)
 
 
 _FIELDS = frozenset(field.name for field in fields(Process) if field.init)
@@ -249,7 +249,7 @@ def how(declared: StartedSpec | ContainerSpec, namespace: str, way: Way = "run")
         if isinstance(value, ReadySpec):
             stated[key] = _ready(value, namespace)
         elif isinstance(value, (ScheduleSpec, StopSpec)):
-            stated[key] = value.planned()
+            stated[key] = value.to_plan()
         elif value is not None:
             stated[key] = value
     if declared.namespace is not None:
@@ -319,11 +319,11 @@ def built_in_processes(spec: RobotSpec) -> list[Process]:
     own = []
     for name in BUILT_IN:
         declared = spec.processes.get(name)
-        at = spec.at_key(("processes", name)) if declared else spec.at_key(("robot",))
+        span = spec.key_span(("processes", name)) if declared else spec.key_span(("robot",))
         path: Path = ("processes", name)
         params = declared.params if declared and name == JOINTS else {}
-        node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at, path, params)
-        process = Process(name, _KINDS[name], at=at, ros_nodes=(node,))
+        node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), span, path, params)
+        process = Process(name, _KINDS[name], span=span, ros_nodes=(node,))
         if declared:
             process = replace(process, **how(declared, spec.ros.namespace, "built-in"))
         own.append(process)
@@ -340,7 +340,7 @@ def says_how(declared: ProcessSpec | None) -> bool:
     )
 
 
-def added_process(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
+def add_process(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
     """Return a process that tfcompose adds, with what stands under its name.
 
     It runs where ``static`` does.
@@ -356,7 +356,7 @@ def added_process(process: Process, declared: ProcessSpec | None, spec: RobotSpe
 
 def check_built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> Iterator[Finding]:
     """Yield findings about what stands under the name of one of tfcompose's own processes."""
-    at: Path = ("processes", name)
+    path: Path = ("processes", name)
     known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
     wrong = declared.model_fields_set - known
     advice = f"its keys can be: {', '.join(sorted(known))}"
@@ -367,7 +367,7 @@ def check_built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> It
         )
     for key in wrong:
         message = f"{name} is built in and has no {key}"
-        yield finding("TF101", message, spec.at_key((*at, key)), help=advice)
+        yield finding("TF101", message, spec.key_span((*path, key)), help=advice)
     if name == JOINTS:
         yield from _joints_params(declared.params, spec)
 
@@ -375,20 +375,22 @@ def check_built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> It
 def _joints_params(params: dict[str, Any], spec: RobotSpec) -> Iterator[Finding]:
     """Yield findings about the parameters of ``joints``."""
     for name, value in params.items():
-        at: Path = ("processes", JOINTS, "params", name)
+        path: Path = ("processes", JOINTS, "params", name)
         example = _JOINTS_PARAMS.get(name)
         if example is None:
             advice = did_you_mean(name, _JOINTS_PARAMS, f"it has {' and '.join(_JOINTS_PARAMS)}")
-            yield finding("TF101", f"joints has no parameter {name}", spec.at_key(at), help=advice)
+            yield finding(
+                "TF101", f"joints has no parameter {name}", spec.key_span(path), help=advice
+            )
         elif isinstance(value, bool) != isinstance(example, bool) or not isinstance(
             value, (bool, int, float)
         ):
             advice = f"for example {name}: {str(example).lower()}"
             what = "true or false" if isinstance(example, bool) else "a number of hertz"
-            yield finding("TF103", f"{name} is {what}", spec.at(at), help=advice)
+            yield finding("TF103", f"{name} is {what}", spec.span_of(path), help=advice)
         elif not isinstance(value, bool) and not 0 < value < math.inf:
             advice = "leave it out, and every joint state is published"
-            yield finding("TF106", f"{name} has to be above 0", spec.at(at), help=advice)
+            yield finding("TF106", f"{name} has to be above 0", spec.span_of(path), help=advice)
 
 
 def check_keys(draft: Draft) -> Iterator[Finding]:
@@ -413,7 +415,7 @@ def _idle_of_containers(spec: RobotSpec) -> Iterator[Finding]:
                 f"{name} is external, so {key} has no effect",
                 "remove it, or set it where the process is started",
             )
-            yield finding("TF851", message, spec.at_key(("containers", name, key)), help=advice)
+            yield finding("TF851", message, spec.key_span(("containers", name, key)), help=advice)
 
 
 def _idle_rate(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Iterator[Finding]:
@@ -426,7 +428,7 @@ def _idle_rate(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> 
     elif path == ("processes", STATIC):
         advice = "remove it; fixed edges are sent once"
     message = f"{name} has no rate; only the process joints has"
-    yield finding("TF101", message, spec.at_key((*path, "rate")), help=advice)
+    yield finding("TF101", message, spec.key_span((*path, "rate")), help=advice)
 
 
 def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Iterator[Finding]:
@@ -456,7 +458,7 @@ def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Itera
             f"{name} is {what}, so {key} has no effect",
             f"remove it: it is for {whom}",
         )
-        yield finding("TF851", message, spec.at_key((*path, key)), help=advice)
+        yield finding("TF851", message, spec.key_span((*path, key)), help=advice)
 
 
 _WORDS = {
@@ -471,24 +473,24 @@ def check_arguments(draft: Draft) -> Iterator[Finding]:
     """Yield findings about files without parameters and keys that reach no node."""
     spec = draft.spec
     for process in draft.robot.processes:
-        at: Path = ("processes", process.name)
+        path: Path = ("processes", process.name)
         names_params_file = any("${params_file}" in text for text in process.texts)
         if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
             keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
             for key in keys:
-                if getattr(process, key) and spec.spans.has((*at, key)):
-                    yield _not_reached(key, process, spec.at_key((*at, key)))
+                if getattr(process, key) and spec.spans.has((*path, key)):
+                    yield _unreached_key(key, process, spec.key_span((*path, key)))
         elif (
             names_params_file
             and not process.all_nodes
             and not any(node.params for node in process.ros_nodes)
-            and spec.spans.has((*at, "run"))
+            and spec.spans.has((*path, "run"))
         ):
             message = f"{process.name} is given ${{params_file}}, and has no parameters"
-            yield finding("TF816", message, spec.at((*at, "run")), help="params: {…}")
+            yield finding("TF816", message, spec.span_of((*path, "run")), help="params: {…}")
 
 
-def _not_reached(key: str, process: Process, at: Span) -> Finding:
+def _unreached_key(key: str, process: Process, span: Span) -> Finding:
     """Return a warning about a key for ROS arguments that a shell or launch file drops."""
     advice = f"write it into the command: --ros-args {_WORDS[key]}; or give run as a list"
     message = f"{key} does not reach {process.name}, whose run is a shell command"
@@ -498,7 +500,7 @@ def _not_reached(key: str, process: Process, at: Span) -> Finding:
             " takes"
         )
         message = f"{key} does not reach the nodes of {process.name}, which ros2 launch starts"
-    return finding("TF107", message, at, help=advice, severity="warning")
+    return finding("TF107", message, span, help=advice, severity="warning")
 
 
 #: The key among a process's parameters that names files with more of them.
@@ -565,19 +567,19 @@ def nodes_of(
     """Return the nodes of a process, at least one."""
     at: Path = ("processes", name)
     if not declared.nodes:
-        place = spec.at((*at, "node")) if declared.node else spec.at_key(at)
+        span = spec.span_of((*at, "node")) if declared.node else spec.key_span(at)
         own_name = name_of(declared.node) or _usual(declared)
         node = full_name(namespace, own_name or name)
-        return (Node(node, place, at, declared.params, declared.lifecycle),)
+        return (Node(node, span, at, declared.params, declared.lifecycle),)
     if declared.publishes:
         message = f"{name} has nodes, and publishes names none of them"
         advice = "write it under one of its nodes"
-        yield finding("TF107", message, spec.at_key((*at, "publishes")), help=advice)
+        yield finding("TF107", message, spec.key_span((*at, "publishes")), help=advice)
     nodes = []
     for node, own in declared.nodes.items():
         path = (*at, "nodes", node)
         nodes.append(
-            Node(full_name(namespace, node), spec.at_key(path), path, own.params, own.lifecycle)
+            Node(full_name(namespace, node), spec.key_span(path), path, own.params, own.lifecycle)
         )
     return tuple(nodes)
 
@@ -636,14 +638,14 @@ def _wrong_positions(
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     movable = [name for name, joint in joints.items() if _has_position(joint)]
     for name, what in wanted.items():
-        place = spec.at_key(("processes", process.name, "simulate", "joints", name))
+        span = spec.key_span(("processes", process.name, "simulate", "joints", name))
         joint = joints.get(name)
         if joint and joint.mimic:
             advice = f"give the position of {joint.mimic}"
             yield finding(
                 "TF703",
                 f"{name} has no position of its own: it mimics {joint.mimic}",
-                place,
+                span,
                 help=advice,
             )
         elif name not in movable:
@@ -653,15 +655,15 @@ def _wrong_positions(
                     movable,
                     f"there is {', '.join(movable)}" if movable else "no joint moves",
                 )
-                yield finding("TF703", f"no moving joint {name}", place, help=advice)
+                yield finding("TF703", f"no moving joint {name}", span, help=advice)
         elif joint and what == SWEEP and _sweep(joint) is None:
             advice = f"give {name} a limit: {{lower, upper}}, or give a position here"
             yield finding(
-                "TF106", f"{name} slides and has no limits to sweep between", place, help=advice
+                "TF106", f"{name} slides and has no limits to sweep between", span, help=advice
             )
         elif joint and isinstance(what, float) and (limits := joint.exceeded_limits(what)):
             message = f"{name} is simulated at {joint.in_unit(what)}, outside its limits, {limits}"
-            yield finding("TF737", message, place, help="correct the position, or the limits")
+            yield finding("TF737", message, span, help="correct the position, or the limits")
 
 
 def _has_position(joint: Joint) -> bool:

@@ -66,7 +66,7 @@ def rename_robot(robot: Robot, names: Names) -> Robot:
     }
     return replace(
         robot,
-        frames={names.frame(name): at for name, at in robot.frames.items()},
+        frames={names.frame(name): span for name, span in robot.frames.items()},
         edges=tuple(_edge(edge, names) for edge in robot.edges),
         links={names.frame(name): _link(link, names) for name, link in robot.links.items()},
         processes=tuple(_process(process, names) for process in kept if process.kind != "guard"),
@@ -167,7 +167,7 @@ def _blocks(robot: Robot, names: Names) -> Iterator[Block]:
         name: names.joint(name) for block in robot.blocks for name in block.own_names()
     } | _again(robot, names)
     for block in robot.blocks:
-        yield replace(block.renamed(again), name=f"{names.part}/{block.name}")
+        yield replace(block.rename(again), name=f"{names.part}/{block.name}")
 
 
 def _calibration(calibration: Calibration, names: Names) -> Calibration:

@@ -150,7 +150,7 @@ def assemble(draft: Draft) -> Iterator[Finding]:
             *source_numbers(spec),
             *(numbers for part in parts for numbers in part.source_numbers),
         ),
-        unused={path: spec.at_key(path) for path in validated.unused},
+        unused={path: spec.key_span(path) for path in validated.unused},
         args=validated.args,
         environment=reduce(or_, (part.environment for part in parts), validated.environment),
         source_data=_source_data(draft),
@@ -161,7 +161,7 @@ def assemble(draft: Draft) -> Iterator[Finding]:
         blocks=_blocks(in_tree),
         foreign=frozenset(file for part in parts for file in part.foreign),
         refused=tuple(
-            span for entry in sorted(validated.broken) if (span := spec.spans.exactly_at(entry))
+            span for entry in sorted(validated.broken) if (span := spec.spans.exact_span(entry))
         ),
         part_notes=draft.collected.notes,
         is_variant=spec.spans.is_variant,
@@ -191,8 +191,8 @@ def find_base(draft: Draft) -> Iterator[Finding]:
         base = _usual_base(robot)
     elif base not in robot.frames:
         if not robot.excuses(base):
-            advice, at = did_you_mean(base, robot.frames), draft.spec.at(("base",))
-            yield finding("TF203", f"unknown frame {base}", at, help=advice)
+            advice, span = did_you_mean(base, robot.frames), draft.spec.span_of(("base",))
+            yield finding("TF203", f"unknown frame {base}", span, help=advice)
         base = None
     draft.robot = replace(robot, base=base)
 

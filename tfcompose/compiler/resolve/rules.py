@@ -30,21 +30,21 @@ def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
         code = code_of(name)
         if code is None or not isinstance(setting, RuleSpec) or setting.limit is None:
             continue
-        place = spec.at(("rules", name, "limit"))
+        span = spec.span_of(("rules", name, "limit"))
         known = CATALOGUE[code].limit
         if known is None:
             others = ", ".join(code.code for code in CATALOGUE.values() if code.limit)
             yield finding(
                 "TF107",
                 f"{code} {CATALOGUE[code].name} has no limit",
-                place,
+                span,
                 help=f"these have one: {others}",
             )
             continue
         dimension, kind, sample = _KINDS[known[1]]
         if setting.limit.dimension not in {NUMBER, dimension}:
             message = f"the limit of {code} is {kind}"
-            yield finding("TF104", message, place, help=f"for example {sample}")
+            yield finding("TF104", message, span, help=f"for example {sample}")
         else:
             limits[code] = setting.limit.value
     return limits
@@ -55,7 +55,7 @@ def zones_of(spec: RobotSpec) -> tuple[Zone, ...]:
     return tuple(
         Zone(
             name,
-            spec.at_key(("coverage", name)),
+            spec.key_span(("coverage", name)),
             zone.frame,
             center=zone.center,
             size=zone.box,

@@ -20,7 +20,7 @@ from tfcompose.model.plan import switch_text
 from tfcompose.model.process_keys import PROCESS_KEYS
 from tfcompose.model.robot import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
 from tfcompose.spec.language.preset import Chosen
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,12 +50,12 @@ def _library(draft: Draft) -> Finds[Library]:
     """Return the presets, with those in the user's folders before the others."""
     folders = []
     for index, named in enumerate(draft.spec.preset_path):
-        at = draft.spec.at(("preset_path", index))
-        folder = path_named(named, at)
+        span = draft.spec.span_of(("preset_path", index))
+        folder = find_path(named, span)
         folders.append(folder)
         if not draft.library.storage.is_folder(folder):
             advice = "make it; it holds VENDOR/MODEL.yaml"
-            yield finding("TF001", f"preset_path: no folder {folder}", at, help=advice)
+            yield finding("TF001", f"preset_path: no folder {folder}", span, help=advice)
     return draft.library.over(folders) if folders else draft.library
 
 
@@ -70,10 +70,10 @@ class _Mounting:
     def add(self) -> Iterator[Finding]:
         """Take the sensor."""
         draft, sensor = self.draft, self.sensor
-        mount = self.renamed(sensor.named(sensor.preset.mount))
-        draft.frames.setdefault(mount, self.place())
-        keys, at = sensor.spec, ("sensors", sensor.name)
-        yield from add_edge(draft, at, mount, keys, joint_name=keys.joint, sensor=sensor.name)
+        mount = self.rename(sensor.fill_name(sensor.preset.mount))
+        draft.frames.setdefault(mount, self.span_of())
+        keys, path = sensor.spec, ("sensors", sensor.name)
+        yield from add_edge(draft, path, mount, keys, joint_name=keys.joint, sensor=sensor.name)
         others = len(draft.processes)
         publisher = yield from self.publisher()
         driver = sensor.name if len(draft.processes) > others else ""
@@ -82,38 +82,38 @@ class _Mounting:
         yield from self.report_unknown()
         yield from self.check_overrides(mount)
         yield from self.add_body()
-        mounted = yield from self.mounted(mount, driver)
+        mounted = yield from self.mount(mount, driver)
         draft.sensors.append(mounted)
 
-    def place(self, *keys: str) -> Span:
+    def span_of(self, *keys: str) -> Span:
         """Return the place of the sensor, or of the value of a key in it."""
-        at: Path = ("sensors", self.sensor.name, *keys)
-        return self.draft.spec.at(at) if keys else self.draft.spec.at_key(at)
+        path: Path = ("sensors", self.sensor.name, *keys)
+        return self.draft.spec.span_of(path) if keys else self.draft.spec.key_span(path)
 
-    def renamed(self, name: str) -> str:
+    def rename(self, name: str) -> str:
         own = self.sensor.spec.frames.get(name)
         return own.name if own and own.name else name
 
     def add_frame(self, name: str, frame: PresetFrame, publisher: str) -> Iterator[Finding]:
         """Take one frame inside the sensor: the unit's own value before the preset's."""
-        own, final = self.sensor.spec.frames.get(name), self.renamed(name)
+        own, final = self.sensor.spec.frames.get(name), self.rename(name)
         parent = self.sensor.parent_of(name, frame)
         owner = publisher if frame.driver else STATIC
         pose, missing = self.pose_of(name, frame, own)
         if missing and owner == STATIC:
             self.unknown[name] = f"{name}: {{{', '.join(missing)}}}"
         kind = "dynamic" if frame.driver == "dynamic" and owner != STATIC else "static"
-        self.draft.frames.setdefault(final, self.place())
+        self.draft.frames.setdefault(final, self.span_of())
         nominal = frame.nominal and not (own and (own.xyz or rotation_of(own, name)))
-        at: Path = ("sensors", self.sensor.name, "frames", name)
-        joint_at = yield from add_joint_name(self.draft, own.joint if own else None, at)
+        path: Path = ("sensors", self.sensor.name, "frames", name)
+        joint_at = yield from add_joint_name(self.draft, own.joint if own else None, path)
         edge = Edge(
-            parent=self.renamed(parent),
+            parent=self.rename(parent),
             child=final,
             kind="dynamic" if kind == "dynamic" else "static",
             owner=owner,
             pose=pose,
-            at=self.place(),
+            span=self.span_of(),
             given=False,
             sensor=self.sensor.name,
             nominal=nominal,
@@ -121,7 +121,7 @@ class _Mounting:
             pose_known=not missing,
             joint_name=(own.joint if own else None) or "",
             joint_at=joint_at,
-            entry=at,
+            entry=path,
         )
         self.draft.edges.append(edge)
 
@@ -157,7 +157,7 @@ class _Mounting:
             message = f"{sensor.spec.preset} has no pose of {names}{parent}"
             frames = ", ".join(self.unknown.values())
             advice = f"measure, and write: sensors: {{{sensor.name}: {{frames: {{{frames}}}}}}}"
-            yield finding("TF605", message, self.place("preset"), help=advice)
+            yield finding("TF605", message, self.span_of("preset"), help=advice)
 
     def publisher(self) -> Finds[str]:
         """Return who publishes the frames inside the sensor that a driver can publish."""
@@ -178,71 +178,71 @@ class _Mounting:
                     " with these options" if _has_driven_frames(sensor) else ""
                 )
             message = f"{sensor.name}: the driver cannot publish its frames: {why}"
-            yield finding("TF604", message, self.place("tf"), help="tf: tfcompose")
+            yield finding("TF604", message, self.span_of("tf"), help="tf: tfcompose")
         elif (
             declared.tf == TFCOMPOSE
             and driver
             and named is None
             and driver.off is None
-            and sensor.driven()
+            and sensor.driver_frames()
         ):
             message = (
                 f"{sensor.name}: the driver of {declared.preset} has no switch for its frames"
             )
             advice = "tf: driver; or driver: none, where there is no device"
-            yield finding("TF604", message, self.place("tf"), help=advice)
+            yield finding("TF604", message, self.span_of("tf"), help=advice)
         return STATIC
 
-    def mounted(self, mount: str, driver: str) -> Finds[MountedSensor]:
+    def mount(self, mount: str, driver: str) -> Finds[MountedSensor]:
         """Return what the rules see of the sensor."""
         sensor, declared, preset = self.sensor, self.sensor.spec, self.sensor.preset
         named = declared.driver.process if declared.driver else None
         serial = next(
             (option for option in ("serial", "serial_number") if option in preset.options), ""
         )
-        inside = (sensor.named(preset.mount), *sensor.frames())
-        optics = yield from optics_of(sensor, inside, self.renamed, self.draft.spec)
+        inside = (sensor.fill_name(preset.mount), *sensor.frames())
+        optics = yield from optics_of(sensor, inside, self.rename, self.draft.spec)
         return MountedSensor(
             sensor.name,
             declared.preset,
             preset.kind,
-            at=self.place(),
+            span=self.span_of(),
             mount=mount,
-            frames=tuple(self.renamed(name) for name in sensor.frames()),
-            driver_frames=tuple(self.renamed(name) for name in sensor.driven()),
+            frames=tuple(self.rename(name) for name in sensor.frames()),
+            driver_frames=tuple(self.rename(name) for name in sensor.driver_frames()),
             driver="" if named == "none" else named or driver,
             switch=preset.driver.off if preset.driver else None,
             publishes=sensor.tf == DRIVER,
             claims={
-                f"{claim.parent} → {self.renamed(sensor.named(claim.child))}": claim.off
+                f"{claim.parent} → {self.rename(sensor.fill_name(claim.child))}": claim.off
                 for claim in claims_of(sensor)
             },
             by_default=preset.driver is None or preset.driver.by_default,
             serial_option=serial,
             serial=sensor.options.get(serial) if serial else None,
-            tf_at=self.place("tf"),
+            tf_at=self.span_of("tf"),
             optics=optics,
         )
 
     def check_overrides(self, mount: str) -> Iterator[Finding]:
         sensor, spec = self.sensor, self.draft.spec
-        original = sensor.named(sensor.preset.mount)
+        original = sensor.fill_name(sensor.preset.mount)
         known = [*sensor.frames(), original]
-        at: Path = ("sensors", sensor.name, "frames")
+        path: Path = ("sensors", sensor.name, "frames")
         for name, own in sensor.spec.frames.items():
-            place = spec.at_key((*at, name))
+            span = spec.key_span((*path, name))
             if name not in known:
                 advice = did_you_mean(name, known, f"there is {', '.join(known)}")
-                yield finding("TF203", f"{sensor.name} has no frame {name}", place, help=advice)
+                yield finding("TF203", f"{sensor.name} has no frame {name}", span, help=advice)
             elif own.parent and own.parent not in known:
                 advice = did_you_mean(own.parent, known, f"there is {', '.join(known)}")
                 message = f"{sensor.name} has no frame {own.parent}"
-                yield finding("TF203", message, spec.at((*at, name, "parent")), help=advice)
+                yield finding("TF203", message, spec.span_of((*path, name, "parent")), help=advice)
         mounted = sensor.spec.frames.get(original)
         if mounted and (mounted.xyz or mounted.parent or mounted.joint or rotation_of(mounted)):
             advice = f"its pose and joint are those of {sensor.name}"
             message = f"{mount} is the mount, and has no pose inside"
-            yield finding("TF106", message, spec.at_key((*at, original)), help=advice)
+            yield finding("TF106", message, spec.key_span((*path, original)), help=advice)
         if mount in sensor.frames():
             message = f"{mount} is a frame inside {sensor.name} already"
             yield finding("TF604", message, self.draft.frames[mount], help="another name")
@@ -251,14 +251,14 @@ class _Mounting:
         body = self.sensor.preset.body
         if body is None:
             return
-        frame = self.renamed(self.sensor.named(body.frame))
+        frame = self.rename(self.sensor.fill_name(body.frame))
         if frame in self.draft.links:
             return
         bodies = Bodies(self.draft.spec, self.draft.packages)
         shape = bodies.shape(body.shape, ("sensors", self.sensor.name))
-        yield from bodies.found
+        yield from bodies.findings
         inertial = of_primitives(body.mass, (shape,)) if body.mass and not shape.mesh else None
-        self.draft.links[frame] = Link(frame, self.place(), (shape,), (shape,), inertial)
+        self.draft.links[frame] = Link(frame, self.span_of(), (shape,), (shape,), inertial)
 
 
 def _has_driven_frames(sensor: Sensor) -> bool:
@@ -279,7 +279,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     """
     driver, declared = sensor.preset.driver, sensor.spec.driver
     spec = validated.spec
-    at: Path = ("sensors", sensor.name, "driver")
+    path: Path = ("sensors", sensor.name, "driver")
     if declared and declared.process is not None:
         return None, [*_check_driver(sensor, declared.process, validated)]
     if declared and declared.simulate:
@@ -288,7 +288,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
             finding(
                 "TF604",
                 "a driver cannot be simulated",
-                spec.at_key((*at, "simulate")),
+                spec.key_span((*path, "simulate")),
                 help=advice,
             )
         ]
@@ -303,19 +303,19 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     params = (declared.params if declared else {}) | _node_parameters(
         sensor, computed, launched=launched
     )
-    place = spec.at_key(at[:2])
+    span = spec.key_span(path[:2])
     state = driver.lifecycle if driver and run is None else None
     node = Node(
         driver_node(sensor, spec),
-        place,
-        at,
+        span,
+        path,
         params,
         (declared.lifecycle if declared else None) or state,
     )
     way: Literal["external", "component", "run"] = (
         "external" if external else "component" if loaded else "run"
     )
-    process = Process(sensor.name, way, at=place, ros_nodes=(node,))
+    process = Process(sensor.name, way, span=span, ros_nodes=(node,))
     if declared:
         process = replace(
             process, **how(declared, namespace_of(declared, spec.ros.namespace), way)
@@ -339,12 +339,12 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
 
 def _says_not_how(name: str, validated: Validated) -> Iterator[Finding]:
     """Yield a finding about a driver that does not say how it runs, unless refused."""
-    at: Path = ("sensors", name, "driver")
-    if not {(*at, "component"), (*at, "container")} & validated.refused:
+    path: Path = ("sensors", name, "driver")
+    if not {(*path, "component"), (*path, "container")} & validated.refused:
         advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, or external: true"
-        place = validated.spec.at_key((*at, "run"))
+        span = validated.spec.key_span((*path, "run"))
         message = f"the driver of {name} does not say how it runs"
-        yield finding("TF102", message, place, help=advice)
+        yield finding("TF102", message, span, help=advice)
 
 
 def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
@@ -354,7 +354,7 @@ def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
         declared and (declared.process or declared.run or declared.external or declared.simulate)
     ):
         return
-    at: Path = ("sensors", sensor.name)
+    path: Path = ("sensors", sensor.name)
     above = namespace_of(declared, spec.ros.namespace)
     inherited = (
         {key: value for key, value in how(declared, above).items() if key in _INHERITED}
@@ -365,20 +365,20 @@ def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
     for suffix, further in driver.also.items():
         if not sensor.holds(further.when):
             continue
-        namespace = full_name(above, sensor.named(further.namespace)).strip("/")
-        name, place = f"{sensor.name}_{suffix}", spec.at_key(at)
-        full = full_name(f"/{namespace}", sensor.named(further.node))
+        namespace = full_name(above, sensor.fill_name(further.namespace)).strip("/")
+        name, span = f"{sensor.name}_{suffix}", spec.key_span(path)
+        full = full_name(f"/{namespace}", sensor.fill_name(further.node))
         node = Node(
             full,
-            place,
-            (*at, "driver", "also", suffix),
+            span,
+            (*path, "driver", "also", suffix),
             fill.table(further.params),
             further.lifecycle,
         )
         process = Process(
             name,
             "run",
-            at=place,
+            span=span,
             ros_nodes=(node,),
             argv=tuple(arguments(fill.table(further.args))),
         )
@@ -395,7 +395,7 @@ def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
     """Return the full name of the driver's node."""
     driver, declared = sensor.preset.driver, sensor.spec.driver
     own = (
-        f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/")
+        f"{sensor.fill_name(driver.namespace)}/{sensor.fill_name(driver.node)}".strip("/")
         if driver
         else sensor.name
     )
@@ -412,7 +412,9 @@ def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
         return {}
     fill = _SensorFiller(sensor, prefix)
     named = _frame_names(sensor, driver)
-    switch = (driver.on if sensor.tf == DRIVER else driver.off or {}) if sensor.driven() else {}
+    switch = (
+        (driver.on if sensor.tf == DRIVER else driver.off or {}) if sensor.driver_frames() else {}
+    )
     claims = {key: value for claim in claims_of(sensor) for key, value in claim.off.items()}
     return (
         fill.table(driver.args if driver.launch else driver.params)
@@ -443,11 +445,11 @@ def _node_parameters(
 
 def _frame_names(sensor: Sensor, driver: PresetDriver) -> dict[str, str]:
     """Return the parameters that name frames, as ``${frame(…)}``, for frames that exist."""
-    inside = {sensor.named(sensor.preset.mount), *sensor.frames()}
-    frames = {key: sensor.named(frame) for key, frame in driver.naming.items()}
+    inside = {sensor.fill_name(sensor.preset.mount), *sensor.frames()}
+    frames = {key: sensor.fill_name(frame) for key, frame in driver.naming.items()}
     renamed = {name: own.name for name, own in sensor.spec.frames.items() if own.name}
     return {
-        sensor.named(key): f"${{frame({renamed.get(frame, frame)})}}"
+        sensor.fill_name(key): f"${{frame({renamed.get(frame, frame)})}}"
         for key, frame in frames.items()
         if frame in inside
     }
@@ -461,7 +463,7 @@ class _SensorFiller:
         self.prefix = prefix
 
     def table(self, table: dict[str, Any]) -> dict[str, Any]:
-        filled = {self.sensor.named(key): self.value(value) for key, value in table.items()}
+        filled = {self.sensor.fill_name(key): self.value(value) for key, value in table.items()}
         return {key: value for key, value in filled.items() if value is not None and value != ""}
 
     def value(self, value: Any) -> Any:
@@ -472,7 +474,7 @@ class _SensorFiller:
                 value.value if self.sensor.holds(value.when or {}) else value.otherwise
             )
         if isinstance(value, str):
-            return self.sensor.named(value).replace("{prefix}", self.prefix)
+            return self.sensor.fill_name(value).replace("{prefix}", self.prefix)
         return value
 
 
@@ -491,14 +493,14 @@ def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
     if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
         return
     settings = settings_of(spec.ros)
-    named = {sensor.named(frame) for frame in driver.naming.values()}
+    named = {sensor.fill_name(frame) for frame in driver.naming.values()}
     stamped = {
-        sensor.named(topic.frame)
+        sensor.fill_name(topic.frame)
         for topic in sensor.preset.topics.values()
         if sensor.holds(topic.when)
     }
-    own = (stamped | ({*sensor.driven()} if sensor.tf == DRIVER else set())) - named
-    at: Path = ("sensors", sensor.name)
+    own = (stamped | ({*sensor.driver_frames()} if sensor.tf == DRIVER else set())) - named
+    path: Path = ("sensors", sensor.name)
     for name in sorted(
         own & {frame for frame, described in declared.frames.items() if described.name}
     ):
@@ -507,20 +509,20 @@ def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
             f"the driver of {declared.preset} makes the name {name} itself, and cannot call it"
             f" {wanted}"
         )
-        place = spec.at((*at, "frames", name, "name"))
+        span = spec.span_of((*path, "frames", name, "name"))
         advice = f"rename the sensor {sensor.name}, or keep the name"
-        yield finding("TF604", message, place, help=advice)
+        yield finding("TF604", message, span, help=advice)
     if (
         settings.frame_prefix
         and not driver.prefixed
-        and own & {*sensor.frames(), sensor.named(sensor.preset.mount)}
+        and own & {*sensor.frames(), sensor.fill_name(sensor.preset.mount)}
     ):
         message = (
             f"the driver of {declared.preset} cannot write {settings.frame_prefix} in front of its"
             " frames"
         )
         advice = "ros: {isolate: topics} keeps robots apart without a prefix"
-        yield finding("TF604", message, spec.at_key(at), help=advice)
+        yield finding("TF604", message, spec.key_span(path), help=advice)
     if (
         driver.launch
         and declared.driver
@@ -528,8 +530,8 @@ def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
         and PARAMS_FILE not in driver.args.values()
     ):
         message = f"{driver.launch} of {declared.preset} takes no file of parameters"
-        place = spec.at_key((*at, "driver", "params"))
-        yield finding("TF604", message, place, help="driver: {run: {package: …, executable: …}}")
+        span = spec.key_span((*path, "driver", "params"))
+        yield finding("TF604", message, span, help="driver: {run: {package: …, executable: …}}")
 
 
 #: Words for no driver that YAML 1.2 reads as strings.
@@ -541,7 +543,7 @@ def _check_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[F
 
     It must be one, and has its own keys.
     """
-    at: Path = ("sensors", sensor.name, "driver")
+    path: Path = ("sensors", sensor.name, "driver")
     spec = validated.spec
     broken = (entry for section, entry in validated.broken if section in {"processes", "sensors"})
     known = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
@@ -556,12 +558,12 @@ def _check_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[F
         if name in OFF:
             advice = "driver: none starts no driver"
         message = f"the driver of {sensor.name} is {name}, which is not a process"
-        yield finding("TF813", message, spec.at(at), help=advice)
+        yield finding("TF813", message, spec.span_of(path), help=advice)
     driver = sensor.spec.driver
     for key in driver.model_fields_set - {"process"} if driver else ():
-        place = spec.at_key((*at, key))
+        span = spec.key_span((*path, key))
         advice = f"write it under processes: {name}"
-        yield finding("TF107", f"{key} and process exclude each other", place, help=advice)
+        yield finding("TF107", f"{key} and process exclude each other", span, help=advice)
 
 
 def _check_parameters(
@@ -574,5 +576,5 @@ def _check_parameters(
                 f"tfcompose sets {switch_text({key: computed[key]})} itself, for"
                 f" {sensor.spec.preset}"
             )
-            place = spec.at_key(("sensors", sensor.name, "driver", "params", key))
-            yield finding("TF604", message, place, help="remove it; options and tf set it")
+            span = spec.key_span(("sensors", sensor.name, "driver", "params", key))
+            yield finding("TF604", message, span, help="remove it; options and tf set it")

@@ -35,7 +35,7 @@ def use_stock_publisher(draft: Draft) -> Iterator[Finding]:
 
 def stock_faults(robot: Robot) -> Iterator[Finding]:
     """Yield what a stock publisher cannot do for a robot with a base."""
-    described = robot.described()
+    described = robot.described_frames()
     for edge in robot.edges:
         if (
             edge.joint
@@ -47,15 +47,15 @@ def stock_faults(robot: Robot) -> Iterator[Finding]:
                 " publishes only joints below it"
             )
             advice = "state_publisher: tfcompose, or another base"
-            yield finding("TF315", message, edge.joint.at, help=advice)
+            yield finding("TF315", message, edge.joint.span, help=advice)
     shared = described & set(robot.ros.shared_frames) if robot.ros.frame_prefix else set[str]()
     for frame in sorted(shared):
         message = (
             f"{frame} is shared and in the tree of {robot.base}: a stock {NAME} prefixes every"
             " frame"
         )
-        at = robot.frames.get(frame)
-        yield finding("TF316", message, at, help="state_publisher: tfcompose")
+        span = robot.frames.get(frame)
+        yield finding("TF316", message, span, help="state_publisher: tfcompose")
 
 
 def with_stock(robot: Robot) -> Robot:
@@ -63,7 +63,7 @@ def with_stock(robot: Robot) -> Robot:
 
     Fixed edges elsewhere stay with ``static``, which then sends the description too.
     """
-    below = robot.described() - {robot.base}
+    below = robot.described_frames() - {robot.base}
     edges = []
     for edge in robot.edges:
         is_taken = edge.owner == STATIC and edge.kind == "static" and edge.child in below
@@ -81,7 +81,7 @@ def _stock(joints: Process, robot: Robot) -> Process:
     params = {"publish_frequency": MOST_HZ} | joints.params
     params["publish_frequency"] = min(float(params["publish_frequency"]), MOST_HZ)
     prefix = {"frame_prefix": robot.ros.frame_prefix} if robot.ros.frame_prefix else {}
-    node = Node(full_name(robot.ros.namespace, NAME), joints.at, params=params | prefix)
+    node = Node(full_name(robot.ros.namespace, NAME), joints.span, params=params | prefix)
     return replace(
         joints,
         kind="run",

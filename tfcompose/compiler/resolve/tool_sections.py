@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.compiler.resolve.processes import added_process, says_how
+from tfcompose.compiler.resolve.processes import add_process, says_how
 from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.hooks import run_hook
 from tfcompose.model.robot import Section
-from tfcompose.spec.language.tool_keys import keys_in, planned_data
+from tfcompose.spec.language.tool_keys import data_for_plan, keys_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,13 +37,13 @@ class ToolSection:
     spec: RobotSpec
     read: Callable[[str], str] | None
 
-    def at(self, *path: str | int) -> Span:
+    def span_of(self, *path: str | int) -> Span:
         """Return the place of a value in the section, or of the nearest around it."""
-        return self.spec.at((self.key.name, *path))
+        return self.spec.span_of((self.key.name, *path))
 
-    def at_key(self, *path: str | int) -> Span:
+    def key_span(self, *path: str | int) -> Span:
         """Return the place of a key in the section, or of the nearest around it."""
-        return self.spec.at_key((self.key.name, *path))
+        return self.spec.key_span((self.key.name, *path))
 
 
 def sections_of(draft: Draft) -> list[ToolSection]:
@@ -63,8 +63,8 @@ def as_sections(draft: Draft) -> dict[str, Section]:
         section.key.name: Section(
             section.key.name,
             section.value,
-            section.spec.at,
-            planned=planned_data(section.key, section.value),
+            section.spec.span_of,
+            planned=data_for_plan(section.key, section.value),
         )
         for section in sections_of(draft)
     }
@@ -82,9 +82,9 @@ def add_sections(draft: Draft) -> Iterator[Finding]:
             if says_how(declared):
                 continue
             if declared is not None:
-                at = draft.spec.at_key(("processes", process.name))
-                process = replace(process, at=at)  # noqa: PLW2901 (the place of its own entry)
-            draft.processes.append(added_process(process, declared, draft.spec))
+                span = draft.spec.key_span(("processes", process.name))
+                process = replace(process, span=span)  # noqa: PLW2901 (the place of its own entry)
+            draft.processes.append(add_process(process, declared, draft.spec))
 
 
 def check_sections(draft: Draft) -> Iterator[Finding]:
@@ -101,7 +101,7 @@ def _hook(section: ToolSection, reference: str, *more: Any) -> Finds[list[Any]]:
     """
     if not reference:
         return []
-    values = run_hook(reference, section.key.name, section.at_key(), section, *more)
+    values = run_hook(reference, section.key.name, section.key_span(), section, *more)
     if isinstance(values, Finding):
         yield values
         return []

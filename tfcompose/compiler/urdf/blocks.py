@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.compiler.urdf.read import read_xml
 from tfcompose.foundation.findings import Finding, Span, did_you_mean, finding, nearest
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.model.robot.hardware import Hardware, HardwareComponent, Interface
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def faults_of(
 ) -> Iterator[Finding]:
     """Yield what is wrong with the elements of a block."""
     if not root.children:
-        yield finding("TF719", "the block has no element", root.at, help="remove it")
+        yield finding("TF719", "the block has no element", root.span, help="remove it")
     for element in root.children:
         if element.tag in _SECTIONS or element.tag in _INNER:
             message = f"<{element.tag}> is not allowed in a block"
@@ -64,14 +64,14 @@ def faults_of(
                 if section
                 else "put it into <gazebo>, a link or a joint"
             )
-            yield finding("TF719", message, element.at, help=advice)
+            yield finding("TF719", message, element.span, help=advice)
         elif (
             element.tag not in _ALLOWED
             and ":" not in element.tag
             and nearest(element.tag, _ALLOWED)
         ):
             advice = did_you_mean(element.tag, _ALLOWED)
-            yield finding("TF719", f"unknown element <{element.tag}>", element.at, help=advice)
+            yield finding("TF719", f"unknown element <{element.tag}>", element.span, help=advice)
         yield from unknown_references(element, frames, joints)
         yield from _undeclared_prefixes(element)
 
@@ -92,7 +92,7 @@ def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
                 yield finding(
                     "TF719",
                     f"undeclared namespace prefix {prefix} in {name}",
-                    element.at,
+                    element.span,
                     help=advice,
                 )
         waiting += [(child, known) for child in element.children]
@@ -100,16 +100,16 @@ def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
 
 def find_unexpanded(text: str, file: str) -> Iterator[Finding]:
     """Yield a finding for each substitution of xacro or launch in the text of a block."""
-    for found in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
-        before = text[: found.start()]
-        line, column = before.count("\n") + 2, found.start() - before.rfind("\n")
-        message = f"{found[0]} is not expanded in a URDF"
+    for match in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
+        before = text[: match.start()]
+        line, column = before.count("\n") + 2, match.start() - before.rfind("\n")
+        message = f"{match[0]} is not expanded in a URDF"
         advice = (
             "write the path itself, or ${config}/x.yaml with vars: {config: /opt/…}, and --set"
             " vars.config=… elsewhere"
         )
-        at = Span(file, line, column, line, column + len(found[0]))
-        yield finding("TF729", message, at, help=advice, severity="warning")
+        span = Span(file, line, column, line, column + len(match[0]))
+        yield finding("TF729", message, span, help=advice, severity="warning")
 
 
 def _blank(comment: re.Match[str]) -> str:
@@ -131,21 +131,21 @@ def unknown_references(
         yield finding(
             "TF203",
             f"unknown link or joint {reference}",
-            element.at_value("reference"),
+            element.value_span("reference"),
             help=advice,
         )
     if element.tag in {"transmission", "ros2_control"}:
         for joint in element.all("joint"):
             name = joint.attributes.get("name", "")
             if name not in joints:
-                yield unknown_joint(name, joint.at_value("name"), joints)
+                yield unknown_joint(name, joint.value_span("name"), joints)
 
 
-def unknown_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
+def unknown_joint(name: str, span: Span, joints: Collection[str]) -> Finding:
     """Return the finding that none of the ``joints``, the moving ones, has this name."""
-    there = f"the robot has {listed(joints, _MOST_NAMED)}"
+    there = f"the robot has {list_names(joints, _MOST_NAMED)}"
     advice = did_you_mean(name, joints, there if joints else "no joint of the robot moves")
-    return finding("TF703", f"no moving joint {name}", at, help=advice)
+    return finding("TF703", f"no moving joint {name}", span, help=advice)
 
 
 def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
@@ -153,7 +153,7 @@ def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> I
     for system in hardware:
         for component in system.components:
             if component.kind == "joint" and component.name not in joints:
-                yield unknown_joint(component.name, component.at, joints)
+                yield unknown_joint(component.name, component.span, joints)
 
 
 def within(
@@ -247,7 +247,7 @@ def _hardware(element: Element, block: Block) -> Hardware:
     plugin = inner.all("plugin")[0]
     places = dict(zip(map(id, element.walk()), block.places, strict=True))
     components = [
-        replace(_component(child), at=places[id(child)])
+        replace(_component(child), span=places[id(child)])
         for child in element.children
         if child.tag in _KINDS
     ]
@@ -258,7 +258,7 @@ def _hardware(element: Element, block: Block) -> Hardware:
         attributes.get("name", ""),
         plugin.text.strip(),
         attributes["type"],
-        at=block.at,
+        span=block.span,
         params=_params(inner),
         components=tuple(components),
         rw_rate=int(attributes["rw_rate"]) if "rw_rate" in attributes else None,
@@ -277,7 +277,7 @@ def _component(element: Element) -> HardwareComponent:
     return HardwareComponent(
         element.tag,
         attributes.get("name", ""),
-        element.at,
+        element.span,
         command=command,
         state=state,
         params=_params(element),

@@ -91,7 +91,7 @@ class Converted:
     of_files: tuple[Finding, ...]
 
     @property
-    def found(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """All that was found."""
         return (*self.of_elements, *self.of_blocks, *self.of_files)
 
@@ -108,11 +108,11 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
     if root.tag != "robot":
         message = f"the root element is <{root.tag}>, not <robot>"
         raise RejectedError(
-            [finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")]
+            [finding("TF018", message, root.span, help="a URDF begins with <robot name=…>")]
         )
     values = AttributeReader()
     values.has_quaternions = version_of(root, values) >= (1, 1)
-    bodies = _Bodies(values, lambda address, at: find(address, at, file), root)
+    bodies = _Bodies(values, lambda address, span: find(address, span, file), root)
     name = values.text(root, "name", '<robot name="rover">')
     links = _by_name(root.all("link"), values)
     joints = root.all("joint")
@@ -123,7 +123,7 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
         "warning",
     )
     edges = [edge for element in joints if (edge := _edge(element, values))]
-    frames = {link: element.at_value("name") for link, element in links.items()}
+    frames = {link: element.value_span("name") for link, element in links.items()}
     names = {edge.joint_name: None for edge in edges}
     referring = (element for element in root.children if element.tag in REFERRING)
     unknown = (
@@ -144,7 +144,9 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
         source_numbers=tuple(_source_numbers(root)),
     )
     of_blocks = tuple(replace(finding, severity="warning") for finding in unknown)
-    return Converted(robot, (*values.found, *unknown_words(root)), of_blocks, tuple(bodies.found))
+    return Converted(
+        robot, (*values.findings, *unknown_words(root)), of_blocks, tuple(bodies.findings)
+    )
 
 
 def _source_numbers(root: Element) -> Iterator[SourceNumbers]:
@@ -180,7 +182,7 @@ def _numbers_of(
 
 def _value_place(element: Element, name: str, _index: int) -> Span:
     """Return the place of an attribute's value: with xacro its numbers may stand nowhere."""
-    return element.at_value(name)
+    return element.value_span(name)
 
 
 def _by_name(
@@ -191,13 +193,13 @@ def _by_name(
     for element in elements:
         name = values.text(element, "name", f'<{element.tag} name="…">')
         if name in known:
-            note = Note("first defined here", known[name].at_value("name"))
+            note = Note("first defined here", known[name].value_span("name"))
             message = f"duplicate {element.tag} name {name}"
             advice = "remove it: ROS parsers reject the robot"
             advice = "rename one of them" if severity == "error" else advice
-            at = element.at_value("name")
-            values.found.append(
-                finding("TF722", message, at, notes=[note], help=advice, severity=severity)
+            span = element.value_span("name")
+            values.findings.append(
+                finding("TF722", message, span, notes=[note], help=advice, severity=severity)
             )
         elif name:
             known[name] = element
@@ -212,9 +214,11 @@ def _blocks(root: Element) -> Iterator[Block]:
             counts[element.tag] = counts.get(element.tag, 0) + 1
             name = f"{element.tag.replace(':', '_')}_{counts[element.tag]}"
             places = (
-                tuple(node.at for node in element.walk()) if element.tag == "ros2_control" else ()
+                tuple(node.span for node in element.walk())
+                if element.tag == "ros2_control"
+                else ()
             )
-            yield Block(name, element.at, _with_namespaces(element, root), places)
+            yield Block(name, element.span, _with_namespaces(element, root), places)
 
 
 def _with_namespaces(element: Element, root: Element) -> str:
@@ -234,14 +238,14 @@ def _edge(element: Element, values: AttributeReader) -> Edge | None:
     name, kind = element.attributes.get("name", ""), values.text(element, "type", 'type="fixed"')
     if kind and kind not in JOINT_TYPES:
         advice = did_you_mean(kind, JOINT_TYPES, f"one of: {', '.join(JOINT_TYPES)}")
-        values.refuse(f"unknown joint type {kind}", element.at_value("type"), advice)
+        values.refuse(f"unknown joint type {kind}", element.value_span("type"), advice)
         # What follows from it is judged as if it were right.
         kind = nearest(kind, JOINT_TYPES) or kind
     ends = {}
     for tag in ("parent", "child"):
         end = element.first(tag)
         if end is None:
-            values.refuse(f"the joint {name} has no {tag}", element.at, f'<{tag} link="…"/>')
+            values.refuse(f"the joint {name} has no {tag}", element.span, f'<{tag} link="…"/>')
         elif values.text(end, "link", f'<{tag} link="…"/>'):
             ends[tag] = end
     joint = _joint(name, kind, element, values) if kind in MOVING or kind in FREE else None
@@ -254,12 +258,12 @@ def _edge(element: Element, values: AttributeReader) -> Edge | None:
         kind="dynamic" if free else "joint" if joint else "static",
         pose=values.pose(element),
         owner=JOINTS if joint and not free else STATIC,
-        at=ends["parent"].at_value("link"),
+        span=ends["parent"].value_span("link"),
         joint=None if free else joint,
         free=joint if free else None,
         joint_name=name,
-        joint_at=element.at_value("name"),
-        child_at=ends["child"].at_value("link"),
+        joint_at=element.value_span("name"),
+        child_at=ends["child"].value_span("link"),
         xyz_at=_xyz_at(element),
     )
 
@@ -269,7 +273,7 @@ def _xyz_at(element: Element) -> Span | None:
     origin = element.first("origin")
     if origin is None or "xyz" not in origin.attributes:
         return None
-    return origin.at_value("xyz")
+    return origin.value_span("xyz")
 
 
 def _joint(name: str, kind: Any, element: Element, values: AttributeReader) -> Joint:
@@ -277,28 +281,28 @@ def _joint(name: str, kind: Any, element: Element, values: AttributeReader) -> J
     x, y, z = values.numbers(axis_element, "xyz", (1.0, 0.0, 0.0))
     length = norm((x, y, z))
     if not 0 < length < math.inf:
-        at = (axis_element or element).at_value("xyz")
-        values.refuse(f"the axis of {name} has no direction", at, '<axis xyz="0 0 1"/>')
+        span = (axis_element or element).value_span("xyz")
+        values.refuse(f"the axis of {name} has no direction", span, '<axis xyz="0 0 1"/>')
         x, y, z, length = 1.0, 0.0, 0.0, 1.0
     axis: Vector = (x / length, y / length, z / length)
     mimic = element.first("mimic")
-    joint = Joint(name, kind, axis, at=element.at_value("name"), axis_length=length)
+    joint = Joint(name, kind, axis, span=element.value_span("name"), axis_length=length)
     if axis_element is not None and "xyz" in axis_element.attributes:
-        joint = replace(joint, axis_at=axis_element.at_value("xyz"))
+        joint = replace(joint, axis_at=axis_element.value_span("xyz"))
     if mimic is not None:
         master = values.text(mimic, "joint", '<mimic joint="…"/>')
         multiplier, offset = (
             values.number(mimic, "multiplier", 1.0),
             values.number(mimic, "offset", 0.0),
         )
-        at = mimic.at_value("joint") if master else mimic.at
+        span = mimic.value_span("joint") if master else mimic.span
         joint = replace(
-            joint, mimic=master or None, multiplier=multiplier, offset=offset, mimic_at=at
+            joint, mimic=master or None, multiplier=multiplier, offset=offset, mimic_at=span
         )
     return replace(
         joint,
         limit=_limit(name, bounds, values),
-        limit_at=bounds.at if bounds is not None else None,
+        limit_at=bounds.span if bounds is not None else None,
         dynamics=_numbers(Dynamics, element.first("dynamics"), values),
         safety=_safety(name, element.first("safety_controller"), values),
         reference=_numbers(ReferencePositions, element.first("calibration"), values),
@@ -309,7 +313,7 @@ def _limit(name: str, element: Element | None, values: AttributeReader) -> Limit
     for key in ("effort", "velocity"):
         if element is not None and key not in element.attributes:
             values.refuse(
-                f"the limit of {name} has no {key}", element.at, f'URDF requires it: {key}="1"'
+                f"the limit of {name} has no {key}", element.span, f'URDF requires it: {key}="1"'
             )
     return _numbers(Limit, element, values)
 
@@ -319,7 +323,7 @@ def _safety(
 ) -> SafetyController | None:
     if element is not None and "k_velocity" not in element.attributes:
         message = f"the safety_controller of {name} has no k_velocity"
-        values.refuse(message, element.at, 'URDF requires it: k_velocity="10"')
+        values.refuse(message, element.span, 'URDF requires it: k_velocity="10"')
     return _numbers(SafetyController, element, values, k_velocity=0.0)
 
 
@@ -332,7 +336,7 @@ def _numbers(
     """
     if element is None:
         return None
-    read = values.bound if cls in _BOUNDS else values.number
+    read = values.read_bound if cls in _BOUNDS else values.number
     values_read = {name: read(element, name) for name in cls.__slots__}
     return cls(
         **defaults | {name: value for name, value in values_read.items() if value is not None}
@@ -341,12 +345,12 @@ def _numbers(
 
 @dataclass
 class _Bodies:
-    """Reads the links of a document; ``found`` holds what is wrong with their files."""
+    """Reads the links of a document; ``findings`` holds what is wrong with their files."""
 
     values: AttributeReader
     find: Callable[[str, Span], tuple[Asset, Finding | None]]
     root: Element
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     _materials: dict[str, Material | None] = field(default_factory=dict)
     _elements: dict[str, list[Element]] = field(default_factory=dict)
     _undescribed: set[str] = field(default_factory=set)
@@ -367,14 +371,14 @@ class _Bodies:
         body = (
             self._inertial(name, inertial, visuals, collisions) if inertial is not None else None
         )
-        return Link(name, element.at_value("name"), visuals, collisions, body)
+        return Link(name, element.value_span("name"), visuals, collisions, body)
 
     def _shapes(self, element: Element) -> list[Shape]:
         geometry = element.first("geometry")
         if geometry is None or not geometry.children:
             advice = '<geometry><box size="1 1 1"/></geometry>'
             self.values.refuse(
-                f"the {element.tag} has no geometry", (geometry or element).at, advice
+                f"the {element.tag} has no geometry", (geometry or element).span, advice
             )
             return []
         shapes = []
@@ -390,24 +394,24 @@ class _Bodies:
         before = self.values.refused
         for key, count in SIZES[form.tag]:
             if key not in form.attributes:
-                self.values.refuse(f"<{form.tag}> has no {key}", form.at)
+                self.values.refuse(f"<{form.tag}> has no {key}", form.span)
                 return []
             size += self.values.numbers(form, key, (0.0,) * count)
         if self.values.refused > before:
             return []
         if not all(0 < value < HUGE for value in size):
-            at = form.at_value(SIZES[form.tag][0][0])
+            span = form.value_span(SIZES[form.tag][0][0])
             severity: Severity = "warning" if min(size) == 0 and max(size) < HUGE else "error"
             advice = "give it a size or remove it: some parsers ignore it, others reject the robot"
             message = f"<{form.tag}> has the size {' '.join(f'{value:g}' for value in size)}"
-            self.values.refuse(message, at, advice, severity)
+            self.values.refuse(message, span, advice, severity)
             return []
         if form.tag == "capsule":
             message, advice = (
                 "parsers of ROS 2 Jazzy reject <capsule>",
                 "use a cylinder and two spheres",
             )
-            self.values.refuse(message, form.at, advice, "warning")
+            self.values.refuse(message, form.span, advice, "warning")
         kind: Any = form.tag
         return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]
 
@@ -416,15 +420,15 @@ class _Bodies:
         if not name:
             return []
         x, y, z = self.values.numbers(form, "scale", (1.0, 1.0, 1.0))
-        asset = self._asset(name, form.at_value("filename"))
+        asset = self._asset(name, form.value_span("filename"))
         return [
             Shape("mesh", (x, y, z), self.values.pose(element), self._material(element), asset)
         ]
 
-    def _asset(self, name: str, at: Span) -> Asset:
-        asset, wrong = self.find(name, at)
+    def _asset(self, name: str, span: Span) -> Asset:
+        asset, wrong = self.find(name, span)
         if wrong:
-            self.found.append(wrong)
+            self.findings.append(wrong)
         return asset
 
     def _material(self, element: Element) -> Material | None:
@@ -437,20 +441,20 @@ class _Bodies:
             return None
         name = material.attributes.get("name", "")
         found = self._describe_material(name, material) or (
-            self._material_named(name) if name else None
+            self._find_material(name) if name else None
         )
         if found is None and name and element.tag == "visual" and name not in self._undescribed:
             self._undescribed.add(name)
             advice = did_you_mean(name, self._described_names, 'describe it: <color rgba="…"/>')
             message = f"no material {name} with a color or texture"
-            self.values.refuse(message, material.at_value("name"), advice, "warning")
+            self.values.refuse(message, material.value_span("name"), advice, "warning")
         return found
 
     @cached_property
     def _described_names(self) -> list[str]:
         return [name for name, (element, *_) in self._elements.items() if element.children]
 
-    def _material_named(self, name: str) -> Material | None:
+    def _find_material(self, name: str) -> Material | None:
         if name not in self._materials:
             described = (
                 self._describe_material(name, element) for element in self._elements.get(name, ())
@@ -467,12 +471,12 @@ class _Bodies:
             self._check_range(colour, (red, green, blue, opacity))
         file = texture.attributes.get("filename") if texture is not None else None
         image = (
-            self._asset(file, texture.at_value("filename"))
+            self._asset(file, texture.value_span("filename"))
             if texture is not None and file
             else None
         )
         rgba = (red, green, blue, opacity) if colour is not None else None
-        return Material(name or colour_name(rgba or ()), rgba, image, material.at)
+        return Material(name or colour_name(rgba or ()), rgba, image, material.span)
 
     def _check_range(self, colour: Element, rgba: tuple[float, ...]) -> None:
         if all(0 <= part <= 1 for part in rgba):
@@ -484,7 +488,7 @@ class _Bodies:
             advice = f'they are from 0 to 1, not to 255: rgba="{listed}"'
         text = colour.attributes["rgba"]
         self.values.refuse(
-            f"rgba={text!r} is out of range", colour.at_value("rgba"), advice, "warning"
+            f"rgba={text!r} is out of range", colour.value_span("rgba"), advice, "warning"
         )
 
     def _inertial(
@@ -498,7 +502,7 @@ class _Bodies:
         if weight is None or tensor is None:
             missing = "mass" if weight is None else "inertia"
             self.values.refuse(
-                f"the inertial of {name} has no {missing}", element.at, f"<{missing} …/>"
+                f"the inertial of {name} has no {missing}", element.span, f"<{missing} …/>"
             )
             return None
         self.values.text(weight, "value", '<mass value="1.5"/>')
@@ -507,7 +511,10 @@ class _Bodies:
             severity: Severity = "warning" if mass == 0 else "error"
             advice = "give a mass in kg, greater than 0, or remove <inertial>"
             self.values.refuse(
-                f"the mass of {name} is {mass:g} kg", weight.at_value("value"), advice, severity
+                f"the mass of {name} is {mass:g} kg",
+                weight.value_span("value"),
+                advice,
+                severity,
             )
             return None
         xx, xy, xz, yy, yz, zz = (self.values.number(tensor, key, 0.0) for key in MOMENTS)
@@ -517,6 +524,6 @@ class _Bodies:
             self.values.pose(element),
             (xx, xy, xz, yy, yz, zz),
             of_shapes,
-            at=tensor.at,
-            mass_at=weight.at_value("value"),
+            span=tensor.span,
+            mass_at=weight.value_span("value"),
         )

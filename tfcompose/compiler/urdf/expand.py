@@ -177,8 +177,8 @@ class _XacroFiles:
         #: Absolute paths of files that were read, and the first path that was not.
         self.served: dict[str, None] = {}
         self.refused: list[str] = []
-        is_of_user = use is None or use.at.file.startswith("--")  # named on the command line
-        reach.add_tree(file if use is None or is_of_user else use.at.file)
+        is_of_user = use is None or use.span.file.startswith("--")  # named on the command line
+        reach.add_tree(file if use is None or is_of_user else use.span.file)
         for name in (file, *(use.files if use else ())):
             if not reach.allows(name):
                 reach.add_package_around(name)
@@ -247,8 +247,8 @@ def _refuse_unknown(
     known = dict.fromkeys(
         name
         for text in texts
-        for found in _ARGUMENT.finditer(text)
-        for name in found.groups()
+        for match in _ARGUMENT.finditer(text)
+        for name in match.groups()
         if name
     )
     wrong = [name for name in names if name not in known]
@@ -263,33 +263,35 @@ def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
     )
 
 
-def _where_used(found: Finding, use: Use | None) -> Finding:
+def _where_used(finding: Finding, use: Use | None) -> Finding:
     """Return a finding in a xacro file at the place in the robot file that names it."""
-    if use is None or found.span is None:
-        return found
-    exact = () if found.span == Span(found.span.file) else (Note("reported here", found.span),)
+    if use is None or finding.span is None:
+        return finding
+    exact = (
+        () if finding.span == Span(finding.span.file) else (Note("reported here", finding.span),)
+    )
     return replace(
-        found,
-        span=use.at,
-        message=f"{found.span.file}: {found.message}",
-        notes=(*exact, *found.notes),
+        finding,
+        span=use.span,
+        message=f"{finding.span.file}: {finding.message}",
+        notes=(*exact, *finding.notes),
     )
 
 
-def _in_call(found: Finding, file: str, use: Use) -> Finding:
+def _in_call(finding: Finding, file: str, use: Use) -> Finding:
     """Return what xacro says about a macro call, at its parameter, with what it takes."""
-    named = [name for name in _WORD.findall(found.message) if name in use.places]
-    macros, at = macros_in(Path(file).read_text("utf-8", "replace")), use.at
+    named = [name for name in _WORD.findall(finding.message) if name in use.places]
+    macros, span = macros_in(Path(file).read_text("utf-8", "replace")), use.span
     if use.macro in macros:
         takes = macros[use.macro]
         advice = f"the params of {use.macro}: {takes}" if takes else f"{use.macro} has no params"
         advice += "; those with * take {xyz, rpy} or XML" if "*" in takes else ""
-        at = use.places[named[-1]] if named else at
+        span = use.places[named[-1]] if named else span
     else:
         advice = did_you_mean(
             use.macro, macros, f"{file} defines {', '.join(macros)}" if macros else ""
         )
-    return replace(_where_used(found, replace(use, at=at)), help=advice)
+    return replace(_where_used(finding, replace(use, span=span)), help=advice)
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,13 +365,15 @@ def _refusal_of(stop: _Stop, files: _XacroFiles, packages: Packages, use: Use | 
     return _in_call(found, file, use) if use and is_of_call else _where_used(found, use)
 
 
-def _at_words(found: Finding, pattern: str, begins: list[tuple[str, int]]) -> Finding:
+def _at_words(finding: Finding, pattern: str, begins: list[tuple[str, int]]) -> Finding:
     """Return the finding at the first words of the pattern from one of these lines on."""
-    at = next((at for file, line in begins if (at := _first(file, pattern, line))), found.span)
-    return replace(found, span=at)
+    span = next(
+        (span for file, line in begins if (span := _first(file, pattern, line))), finding.span
+    )
+    return replace(finding, span=span)
 
 
-def _place_finding(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Finding:
+def _place_finding(finding: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Finding:
     """Return the finding at its words, with notes about the macros being expanded.
 
     Where the words are not to be found it is at the element that xacro was busy with. Places are
@@ -377,21 +381,21 @@ def _place_finding(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -
     """
     around = dict.fromkeys((name, file) for name, file in reversed(stop.macros))
     inner = [(name, begin) for name, file in around if (begin := _definition(file, name))]
-    notes = [Note(f"in the macro {name}", at) for name, at in inner[:_MOST_MACROS]]
+    notes = [Note(f"in the macro {name}", span) for name, span in inner[:_MOST_MACROS]]
     if stop.error:
-        at: Span | None = _mark(*stop.error)
+        span: Span | None = _mark(*stop.error)
     else:
         begins = [
             *begins,
             *((macro.file, macro.line) for _, macro in inner),
             *((file, 0) for file in stop.files[::-1]),
         ]
-        busy = _mark(*stop.at) if stop.at else found.span
-        at = next(
-            (name for file, line in begins for name in _spans_named(found.message, file, line)),
+        busy = _mark(*stop.at) if stop.at else finding.span
+        span = next(
+            (name for file, line in begins for name in _find_spans(finding.message, file, line)),
             busy,
         )
-    return replace(found, span=at, notes=(*found.notes, *notes))
+    return replace(finding, span=span, notes=(*finding.notes, *notes))
 
 
 def _mark(file: str, line: int, column: int) -> Span:
@@ -440,14 +444,14 @@ def _definition(file: str | None, macro: str) -> Span | None:
     )
 
 
-def _spans_named(message: str, file: str, line: int) -> Iterator[Span]:
+def _find_spans(message: str, file: str, line: int) -> Iterator[Span]:
     """Yield where the file has what the message names, from a line on."""
     for naming, before, after in _NAMED:
-        for found in naming.finditer(message):
-            end = after if len(found[1].split()) <= _MOST_WORDS else ""
-            at = _first(file, before + _pattern_of(found[1]) + end, line)
-            if at:
-                yield at
+        for match in naming.finditer(message):
+            end = after if len(match[1].split()) <= _MOST_WORDS else ""
+            span = _first(file, before + _pattern_of(match[1]) + end, line)
+            if span:
+                yield span
 
 
 def _pattern_of(text: str) -> str:
@@ -461,24 +465,24 @@ def _first(file: str | None, pattern: str, line: int) -> Span | None:
         return None
     text = Path(file).read_text("utf-8", "replace")
     start = sum(map(len, text.splitlines(keepends=True)[: max(line - 1, 0)]))
-    found = re.compile(pattern).search(text, start)
-    if found is None:
+    match = re.compile(pattern).search(text, start)
+    if match is None:
         return None
-    return Span(file, *_position(text, found.start()), *_position(text, found.end()))
+    return Span(file, *_position(text, match.start()), *_position(text, match.end()))
 
 
 def _position(text: str, index: int) -> tuple[int, int]:
     return text.count("\n", 0, index) + 1, index - text.rfind("\n", 0, index)
 
 
-def _relative_to(file: str, found: Finding) -> Finding:
+def _relative_to(file: str, finding: Finding) -> Finding:
     """Return the finding with places relative to the working folder, ``file`` as named."""
 
-    def shown(span: Span | None) -> Span | None:
+    def find_span(span: Span | None) -> Span | None:
         return span._replace(file=_show_file(span.file, file)) if span else None
 
-    notes = tuple(replace(note, span=shown(note.span)) for note in found.notes)
-    return replace(found, span=shown(found.span), notes=notes)
+    notes = tuple(replace(note, span=find_span(note.span)) for note in finding.notes)
+    return replace(finding, span=find_span(finding.span), notes=notes)
 
 
 def _show_file(name: str, file: str) -> str:

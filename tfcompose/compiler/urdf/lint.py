@@ -59,7 +59,7 @@ class Document:
         """Return what is wrong with it, by place, but for what its comments allow."""
         roots = self.robot.roots()
         robot = replace(with_hardware(self.robot), base=roots[0] if len(roots) == 1 else None)
-        found = dict.fromkeys([*self.converted.found, *check(robot, _RULES)])
+        found = dict.fromkeys([*self.converted.findings, *check(robot, _RULES)])
         kept, used = apply(found, self.allows)
         return sorted([*kept, *unused_allows(self.allows, used)], key=lambda entry: entry.sort_key)
 
@@ -115,5 +115,5 @@ def _kept_allows(expansion: Expansion, read: Callable[[str], str]) -> Iterator[A
             (line, column + 1) for file, line, column in expansion.comments if file == number
         }
         for allow in allows_in_xml(read(expansion.files[number]), expansion.files[number]):
-            if (allow.at.line, allow.at.column) in begins:
+            if (allow.span.line, allow.span.column) in begins:
                 yield allow

@@ -120,7 +120,7 @@ def _blocks(robot: Robot) -> list[str]:
     names = [*_names(robot), *(name for block in robot.blocks for name in block.own_names())]
     again = {name: f"${{prefix}}{name}" for name in map(_literal, names)}  # as in the text below
     return block_lines(
-        replace(block, text=_literal(block.text)).renamed(again) for block in robot.blocks
+        replace(block, text=_literal(block.text)).rename(again) for block in robot.blocks
     )
 
 

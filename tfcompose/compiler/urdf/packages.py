@@ -16,7 +16,7 @@ from urllib.parse import unquote
 
 from tfcompose.foundation.findings import Finding, RejectedError, Span, finding, nearest, slip_of
 from tfcompose.model.robot import Asset
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -44,7 +44,7 @@ FETCH = "run git lfs pull to fetch the file"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 
 
-def _not_expanded(file: str, *_: object) -> Expansion:
+def _reject_expansion(file: str, *_: object) -> Expansion:
     raise RejectedError([finding("TF001", "files cannot be read here", Span(file))])
 
 
@@ -63,7 +63,7 @@ class Disk:
     is_folder: Callable[[str], bool]
     prefixes: tuple[str, ...] = ()
     moments: Callable[[str, Vector], Moments] | None = None
-    expand: Callable[[str, Packages, Mapping[str, Any], Use | None], Expansion] = _not_expanded
+    expand: Callable[[str, Packages, Mapping[str, Any], Use | None], Expansion] = _reject_expansion
     is_pointer: Callable[[str], bool] = lambda _: False
     #: Whether a file may be read at all.
     allows: Callable[[str], bool] = lambda _: True
@@ -89,7 +89,7 @@ class Packages:
 
     def candidates(self, name: str) -> list[str]:
         """Return the folders that a package of that name may be in, in the order of looking."""
-        own = [path_named(*self.named[name])] if name in self.named else []
+        own = [find_path(*self.named[name])] if name in self.named else []
         return own + [
             posixpath.join(prefix, "share", name)
             for prefix in (self.disk.prefixes if self.disk else ())
@@ -108,7 +108,7 @@ class Packages:
         around, folder = ("", "") if found is not None else self._around(posixpath.dirname(file))
         return (folder or ".") if around == name else found
 
-    def not_found(self, name: str, at: Span | None) -> Finding:
+    def not_found(self, name: str, span: Span | None) -> Finding:
         """Return the finding that a package was not found, with the searched folders."""
         folders = self.candidates(name)
         searched = f"looked in {', '.join(folders)}" if folders else "AMENT_PREFIX_PATH is empty"
@@ -118,9 +118,9 @@ class Packages:
             f"{searched};"
             f" {'correct the folder that it is given' if name in self.named else way_out}"
         )
-        return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
+        return finding("TF724", f"package {name} not found", span, help=advice, severity="warning")
 
-    def path_of(self, named: str, at: Span) -> str:
+    def path_of(self, named: str, span: Span) -> str:
         """Return the path of a file that is named at a place.
 
         In a package, or relative to the file there.
@@ -128,22 +128,22 @@ class Packages:
         Raises:
             RejectedError: if the package is not found.
         """
-        found = _IN_PACKAGE.fullmatch(named)
-        if found is None:
-            return path_named(named, at)
-        folder = self.folder(found[1], at.file)
+        match = _IN_PACKAGE.fullmatch(named)
+        if match is None:
+            return find_path(named, span)
+        folder = self.folder(match[1], span.file)
         if folder is None:
-            raise RejectedError([replace(self.not_found(found[1], at), severity="error")])
-        return posixpath.join(folder, found[2])
+            raise RejectedError([replace(self.not_found(match[1], span), severity="error")])
+        return posixpath.join(folder, match[2])
 
-    def asset(self, uri: str, at: Span, document: str = "") -> tuple[Asset, Finding | None]:
+    def asset(self, uri: str, span: Span, document: str = "") -> tuple[Asset, Finding | None]:
         """Return the file that is addressed at a place, and what is wrong with the address.
 
         ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files;
         relative ones begin in the folder of the file that names them, or of the ``document`` that
         includes it. Other schemes (``http``, ``model``) are for others to resolve.
         """
-        document = document or at.file
+        document = document or span.file
         url = _MEANT.fullmatch(uri)
         if url or not uri:
             advice = (
@@ -151,31 +151,31 @@ class Packages:
                 if url
                 else "write package://NAME/PATH or a path"
             )
-            return Asset(uri, at), finding(
-                "TF723", f"{uri or repr(uri)} is not a valid file address", at, help=advice
+            return Asset(uri, span), finding(
+                "TF723", f"{uri or repr(uri)} is not a valid file address", span, help=advice
             )
         scheme = _SCHEME.match(uri)
         if scheme and scheme[1] == "package":
-            return self._in_package(uri, at, document)
+            return self._in_package(uri, span, document)
         if scheme and scheme[1] != "file":
-            return Asset(uri, at), None
+            return Asset(uri, span), None
         path = unquote(uri[scheme.end() :]) if scheme else uri
         if scheme and not path.startswith("/"):
             wrong = f"{uri} is not a valid file address"
-            return Asset(uri, at), finding(
-                "TF723", wrong, at, help="file:// with an absolute path has three slashes"
+            return Asset(uri, span), finding(
+                "TF723", wrong, span, help="file:// with an absolute path has three slashes"
             )
         path = (
-            posixpath.normpath(path) if path.startswith("/") else path_named(path, Span(document))
+            posixpath.normpath(path) if path.startswith("/") else find_path(path, Span(document))
         )
-        if refusal := self._refusal(path, uri, at):
-            return Asset(uri, at), refusal
+        if refusal := self._refusal(path, uri, span):
+            return Asset(uri, span), refusal
         package, inside = self._package_above(path)
-        return Asset(uri, at, path, package, inside), self._missing(
-            path, f"file {uri} not found", at
+        return Asset(uri, span, path, package, inside), self._missing(
+            path, f"file {uri} not found", span
         )
 
-    def _in_package(self, uri: str, at: Span, document: str) -> tuple[Asset, Finding | None]:
+    def _in_package(self, uri: str, span: Span, document: str) -> tuple[Asset, Finding | None]:
         name, _, inside = unquote(uri.partition("://")[2]).partition("/")
         if not name or not inside:
             advice = (
@@ -183,40 +183,42 @@ class Packages:
                 if "/" in inside
                 else "package://NAME/PATH"
             )
-            return Asset(uri, at), finding(
-                "TF723", f"{uri} is not a valid file address", at, help=advice
+            return Asset(uri, span), finding(
+                "TF723", f"{uri} is not a valid file address", span, help=advice
             )
         folder = self.folder(name, document)
         if folder is None:
             is_new = self.disk is not None and (name, document) not in self._missed
             self._missed.add((name, document))  # a missing package is reported once for each file
-            return Asset(uri, at, "", name, inside), self.not_found(name, at) if is_new else None
+            return Asset(uri, span, "", name, inside), self.not_found(
+                name, span
+            ) if is_new else None
         if folder not in self.candidates(name):
             self.local[name] = folder
         path = posixpath.join(folder, inside)
-        if refusal := self._refusal(path, uri, at):
-            return Asset(uri, at), refusal
-        return Asset(uri, at, path, name, inside), self._missing(
-            path, f"file {inside} not found in {name}", at
+        if refusal := self._refusal(path, uri, span):
+            return Asset(uri, span), refusal
+        return Asset(uri, span, path, name, inside), self._missing(
+            path, f"file {inside} not found in {name}", span
         )
 
-    def _refusal(self, path: str, uri: str, at: Span) -> Finding | None:
+    def _refusal(self, path: str, uri: str, span: Span) -> Finding | None:
         if self.disk is None or self.disk.allows(path):
             return None
         message = f"{uri} may not be read: it is outside of the robot's tree"
-        return finding("TF021", message, at, help=OUTSIDE)
+        return finding("TF021", message, span, help=OUTSIDE)
 
-    def _missing(self, path: str, message: str, at: Span) -> Finding | None:
+    def _missing(self, path: str, message: str, span: Span) -> Finding | None:
         if self.disk is None:
             return None
         if "\0" in path or not self.disk.is_file(path):
             where = (
                 path if path.startswith("/") else f"{path}, from the folder where tfcompose runs"
             )
-            return finding("TF723", message, at, help=f"looked for {where}")
+            return finding("TF723", message, span, help=f"looked for {where}")
         if self.disk.is_pointer(path):
             return finding(
-                "TF723", f"{path} is a Git LFS pointer", at, help=FETCH, severity="warning"
+                "TF723", f"{path} is a Git LFS pointer", span, help=FETCH, severity="warning"
             )
         return None
 
@@ -241,8 +243,8 @@ class Packages:
         for _ in range(_HIGHEST if self.disk else 0):
             manifest = posixpath.join(folder, "package.xml")
             if self.disk and self.disk.is_file(manifest):
-                found = _PACKAGE_NAME.search(self.disk.read(manifest))
-                return (found[1], folder) if found else ("", "")
+                match = _PACKAGE_NAME.search(self.disk.read(manifest))
+                return (match[1], folder) if match else ("", "")
             above = posixpath.normpath(posixpath.join(folder, ".."))
             if above == folder:
                 break

@@ -46,7 +46,7 @@ class _Text:
     def __init__(self, text: str, file: str) -> None:
         self.text, self.file = text, file
         self.data = text.encode()
-        self.starts = [0, *(found.end() for found in _BREAK.finditer(text))]
+        self.starts = [0, *(match.end() for match in _BREAK.finditer(text))]
         self.has_broken_values = _BROKEN.search(text) is not None
         self.before: list[
             int
@@ -136,13 +136,13 @@ class Element:
         self.begin = self.end = begin
         self._source, self._origin = source, origin
 
-    def _declared(self) -> _Origin:
+    def _declared_origin(self) -> _Origin:
         return self._origin or _Origin(self._source, self._source.position(self.begin))
 
     @property
-    def at(self) -> Span:
+    def span(self) -> Span:
         """The place of its tag."""
-        declared = self._declared()
+        declared = self._declared_origin()
         return declared.source.span(declared.begin, len(self.tag) + 1)
 
     @property
@@ -176,11 +176,11 @@ class Element:
             yield element
             waiting += reversed(element.children)
 
-    def at_value(self, name: str) -> Span:
+    def value_span(self, name: str) -> Span:
         """Return the place of an attribute's value, or the element's where it is missing."""
-        declared = self._declared()
+        declared = self._declared_origin()
         place = declared.source.tag_at(declared.begin)[0].get(name)
-        return declared.source.span(place[0], place[1] - place[0] or 1) if place else self.at
+        return declared.source.span(place[0], place[1] - place[0] or 1) if place else self.span
 
     def raw_value(self, name: str) -> str:
         """Return an attribute's value as in the text.
@@ -251,37 +251,37 @@ class _UrdfReader:
         try:
             self.parser.Parse(self.source.data, True)  # noqa: FBT003 (the last piece; it takes no keywords)
         except expat.ExpatError as error:
-            at = self._at(self.parser.ErrorByteIndex, 1)
-            raise RejectedError([self._not_xml(error.code, at)]) from None
+            span = self._span_of(self.parser.ErrorByteIndex, 1)
+            raise RejectedError([self._not_xml(error.code, span)]) from None
         if self.root is None:
             raise RejectedError([finding("TF018", "no element", Span(self.source.file))])
         return self.root
 
-    def _not_xml(self, code: int, at: Span) -> Finding:
+    def _not_xml(self, code: int, span: Span) -> Finding:
         """Return the finding about a place where the text stops being XML."""
         reason = expat.ErrorString(code) or "not XML"
         if not self.stack or code not in _UNCLOSED:
-            return finding("TF018", reason, at, help="fix it; other parsers stop here too")
+            return finding("TF018", reason, span, help="fix it; other parsers stop here too")
         inner = self.stack[-1]
         message = f"{reason}: <{inner.tag}> is not closed"
-        notes = [Note(f"{inner.tag} begins here", inner.at)]
-        return finding("TF018", message, at, help=f"write </{inner.tag}> before it", notes=notes)
+        notes = [Note(f"{inner.tag} begins here", inner.span)]
+        return finding("TF018", message, span, help=f"write </{inner.tag}> before it", notes=notes)
 
     def add_text(self, piece: str) -> None:
         if self.stack:
             self.stack[-1].text += piece
 
-    def _at(self, byte: int, length: int) -> Span:
+    def _span_of(self, byte: int, length: int) -> Span:
         return self.source.span(self.source.position(byte), length)
 
     def _refuse_type(self, *_: object) -> None:
-        at = self._at(self.parser.CurrentByteIndex, 9)
+        span = self._span_of(self.parser.CurrentByteIndex, 9)
         raise RejectedError(
             [
                 finding(
                     "TF018",
                     "a document type is not allowed: it can declare entities",
-                    at,
+                    span,
                     help="remove it",
                 )
             ]
@@ -298,7 +298,7 @@ class _UrdfReader:
                 if self.elements > MOST_VALUES
                 else f"nested deeper than {DEEPEST} elements"
             )
-            raise RejectedError([finding("TF008", what, element.at)])
+            raise RejectedError([finding("TF008", what, element.span)])
         if self.stack:
             self.stack[-1].children.append(element)
         else:

@@ -58,7 +58,7 @@ def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Itera
     if there.name != robot.name:
         yield f"its name is {there.name}, not {robot.name}"
     base = robot.base or ""
-    frames = robot.described()
+    frames = robot.described_frames()
     links = {link.name: link for link in there.links}
     joints = {joint.child: joint for joint in there.joints}
     edges = {
@@ -181,7 +181,7 @@ def _of_link(
         for element, (shape, (kind, values, pose)) in zip(found, expected, strict=True):
             if _form(getattr(element.geometry, kind)) != values or _is_moved(element.origin, pose):
                 yield f"a {kind} of its {tag} differs"
-            if tag == "visual" and _paint(element.material) != _meant_paint(
+            if tag == "visual" and _paint(element.material) != _expected_paint(
                 shape.material, target
             ):
                 yield f"the material of a {kind} differs"
@@ -204,7 +204,7 @@ def _paint(there: yourdfpy.Material | None) -> dict[str, Any]:
     return {"name": there.name} | colour | image
 
 
-def _meant_paint(material: Material | None, target: Target) -> dict[str, Any]:
+def _expected_paint(material: Material | None, target: Target) -> dict[str, Any]:
     if material is None:
         return {}
     colour = {"rgba": material.rgba} if material.rgba else {}

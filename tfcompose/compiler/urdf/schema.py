@@ -114,9 +114,9 @@ def _unexpanded_finding(element: Element) -> Finding:
     """
     if element.tag in _XACRO:
         message = f"<{element.tag}> is a tag of xacro, not expanded without its prefix"
-        return finding("TF720", message, element.at, help=f"<xacro:{element.tag} …>")
+        return finding("TF720", message, element.span, help=f"<xacro:{element.tag} …>")
     advice = "in a part, use xacro: instead of urdf:"
-    return finding("TF720", f"<{element.tag}> was not expanded", element.at, help=advice)
+    return finding("TF720", f"<{element.tag}> was not expanded", element.span, help=advice)
 
 
 def _unknown(
@@ -130,10 +130,10 @@ def _unknown(
         if known
         else "nothing is allowed here"
     )
-    at = element.at_value(attribute) if attribute else element.at
+    span = element.value_span(attribute) if attribute else element.span
     wrong = near and (slip_of(name, known) or nearest(name, known, _MISSPELT))
     return finding(
-        "TF720", f"unknown {what}", at, help=advice, severity="error" if wrong else "warning"
+        "TF720", f"unknown {what}", span, help=advice, severity="error" if wrong else "warning"
     )
 
 
@@ -143,27 +143,27 @@ HUGE = 1e30
 
 @dataclass(slots=True)
 class AttributeReader:
-    """Reads attributes; ``found`` collects faults, ``has_quaternions`` allows quat_xyzw.
+    """Reads attributes; ``findings`` collects faults, ``has_quaternions`` allows quat_xyzw.
 
     ``refused`` counts what is no value; what is a warning only leaves a value as it is.
     """
 
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     has_quaternions: bool = False
     refused: int = 0
 
     def refuse(
-        self, message: str, at: Span, advice: str = "", severity: Severity = "error"
+        self, message: str, span: Span, advice: str = "", severity: Severity = "error"
     ) -> None:
         """Note that a value is wrong."""
-        self.found.append(finding("TF721", message, at, help=advice, severity=severity))
+        self.findings.append(finding("TF721", message, span, help=advice, severity=severity))
         self.refused += severity == "error"
 
     def text(self, element: Element, name: str, example: str) -> str:
         """Return an attribute that must be there, or an empty text."""
         value = element.attributes.get(name, "")
         if not value:
-            self.refuse(f"<{element.tag}> has no {name}", element.at, f"for example {example}")
+            self.refuse(f"<{element.tag}> has no {name}", element.span, f"for example {example}")
         return value
 
     def numbers(
@@ -185,18 +185,18 @@ class AttributeReader:
             text = element.attributes[name]
             self.refuse(
                 f"{name}={text!r} is not {count}",
-                element.at_value(name),
+                element.value_span(name),
                 _advice(text, len(default)),
             )
             return default
         if max(map(abs, values)) > HUGE:
-            self.refuse(f"{name} is too large", element.at_value(name))
+            self.refuse(f"{name} is too large", element.value_span(name))
             return default
         if element.has_broken_values and re.search(r"[\t\r\n]", element.raw_value(name).lstrip()):
             message = f"tab or line break between the numbers of {name}"
             self.refuse(
                 message,
-                element.at_value(name),
+                element.value_span(name),
                 "use spaces: ROS parsers reject the robot for it",
                 "warning",
             )
@@ -208,7 +208,7 @@ class AttributeReader:
             return default
         return self.numbers(element, name, (0.0,))[0]
 
-    def bound(self, element: Element, name: str) -> float | None:
+    def read_bound(self, element: Element, name: str) -> float | None:
         """Return an attribute's number that limits something.
 
         One that limits nothing is as large as numbers may be.
@@ -221,7 +221,7 @@ class AttributeReader:
             return self.number(element, name)  # type: ignore[no-any-return]  # a number, or None
         used = math.copysign(HUGE, value)
         message = f"{name} is too large: {used:g} is used"
-        self.refuse(message, element.at_value(name), "such a limit limits nothing", "warning")
+        self.refuse(message, element.value_span(name), "such a limit limits nothing", "warning")
         return used
 
     def pose(self, parent: Element) -> Pose:
@@ -232,16 +232,16 @@ class AttributeReader:
             return Pose((x, y, z), self._quaternion(origin))
         roll, pitch, yaw = self.numbers(origin, "rpy", (0.0, 0.0, 0.0))
         if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
-            self.refuse("rpy is out of range", origin.at_value("rpy") if origin else parent.at)
+            self.refuse("rpy is out of range", origin.value_span("rpy") if origin else parent.span)
             return Pose((x, y, z))
         return Pose((x, y, z), normalise(quat_from_rpy(roll, pitch, yaw)))
 
     def _quaternion(self, origin: Element) -> Quaternion:
         """Return the rotation given as a quaternion, which URDF has since version 1.1."""
-        before, at = self.refused, origin.at_value("quat_xyzw")
+        before, span = self.refused, origin.value_span("quat_xyzw")
         x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
         if not any((x, y, z, w)):
-            self.refuse("the quaternion has no length", at, "no rotation is 0 0 0 1")
+            self.refuse("the quaternion has no length", span, "no rotation is 0 0 0 1")
         if self.refused > before:
             return (0.0, 0.0, 0.0, 1.0)
         turned = normalise((x, y, z, w))
@@ -249,11 +249,11 @@ class AttributeReader:
         if "rpy" in origin.attributes:
             self.refuse(
                 "the origin has both rpy and quat_xyzw: parsers reject the robot",
-                at,
+                span,
                 "remove one of them",
             )
         elif not self.has_quaternions:
-            self.refuse("parsers ignore quat_xyzw", at, f'write rpy="{angles}"')
+            self.refuse("parsers ignore quat_xyzw", span, f'write rpy="{angles}"')
         return turned
 
 
@@ -265,12 +265,12 @@ def version_of(root: Element, values: AttributeReader) -> tuple[int, ...]:
     text = root.attributes.get("version", "1.0")
     version = tuple(map(int, text.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", text) else ()
     if version != (1, 0):
-        at = root.at_value("version")
+        span = root.value_span("version")
         if version:
             message = f"parsers of ROS 2 Jazzy reject version {text}: they support 1.0 only"
-            values.refuse(message, at, "remove it, unless something here needs it", "warning")
+            values.refuse(message, span, "remove it, unless something here needs it", "warning")
         else:
-            values.refuse(f"invalid version {text!r}", at, 'version="1.0"')
+            values.refuse(f"invalid version {text!r}", span, 'version="1.0"')
     return version
 
 

@@ -100,7 +100,7 @@ class UrdfWriter:
         """
         if robot.base is None:
             raise ValueError(f"{robot.name} has no base")
-        described = robot.described()
+        described = robot.described_frames()
         edges = [edge for edge in _below(robot.base, robot.children()) if edge.child in described]
         links = [
             line for edge in edges for line in self.link(edge.child, robot.links.get(edge.child))
@@ -138,10 +138,10 @@ class UrdfWriter:
         material = [self._material(shape.material)] if shape.material and tag == "visual" else []
         lines = []
         for geometry, pose in self._geometries(shape):
-            at = _origin(pose, "      ")
+            path = _origin(pose, "      ")
             lines += [
                 f"    <{tag}>",
-                *at,
+                *path,
                 f"      <geometry>{geometry}</geometry>",
                 *material,
                 f"    </{tag}>",

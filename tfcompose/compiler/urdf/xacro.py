@@ -37,7 +37,7 @@ class Expansion:
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """How a robot file uses a xacro file, ``at`` a place.
+    """How a robot file uses a xacro file, ``span`` a place.
 
     As a whole, or a call of a ``macro`` that is defined there.
 
@@ -45,7 +45,7 @@ class Use:
     XML; ``files`` are what is included for it.
     """
 
-    at: Span
+    span: Span
     macro: str = ""
     words: dict[str, str] = field(default_factory=dict)
     blocks: tuple[str, ...] = ()
@@ -56,8 +56,8 @@ class Use:
 def macros_in(text: str) -> dict[str, str]:
     """Return the parameters of each macro that a xacro file defines, by macro name."""
     macros = {}
-    for found in _MACRO.finditer(text):
-        end = text.find(">", found.end(), found.end() + _LONGEST)
-        params = _PARAMS.search(text[found.start() : end]) if end >= 0 else None
-        macros[found[1]] = " ".join((params[1] or params[2] or "").split()) if params else ""
+    for match in _MACRO.finditer(text):
+        end = text.find(">", match.end(), match.end() + _LONGEST)
+        params = _PARAMS.search(text[match.start() : end]) if end >= 0 else None
+        macros[match[1]] = " ".join((params[1] or params[2] or "").split()) if params else ""
     return macros

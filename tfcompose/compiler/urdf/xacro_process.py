@@ -174,7 +174,7 @@ class XacroRun:
         self._cloned = _Cloned()
         self._noted = ""
 
-    def made(self, request: dict[str, Any]) -> dict[str, Any]:
+    def expand(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return xacro's document with the places of its elements, or why there is none."""
         try:
             with self._hook_xacro():
@@ -447,7 +447,7 @@ def main(reads: int, writes: int, noted: int) -> None:
             data = text.encode("utf-8", "replace")[: len(kept) - 1] + b"\0"
             kept[: len(data)] = data
 
-        answer = XacroRun(XacroFiles(channel), note).made(request)
+        answer = XacroRun(XacroFiles(channel), note).expand(request)
         sys.stdout.flush()
         channel.send({"answer": answer})
     os._exit(0)  # nothing is left to be done, and a large document takes long to be freed

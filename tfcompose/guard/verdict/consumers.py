@@ -10,7 +10,7 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
-from tfcompose.foundation.text import duration, listed
+from tfcompose.foundation.text import duration, list_names
 from tfcompose.foundation.tree import way_up
 from tfcompose.guard.verdict.stamps import (
     SLOW_S,
@@ -48,7 +48,7 @@ def data_frame_unknown(state: TreeState) -> Iterator[Finding]:
     for each in state.stamped:
         if each.frame in frames or not frames:
             continue
-        who_sends = listed(each.nodes) or "somebody"
+        who_sends = list_names(each.nodes) or "somebody"
         if not each.frame:
             message = f"{each.topic} from {who_sends} has no frame_id, so its position is unknown"
             yield finding("TF840", message, None, help="set the driver's frame_id")
@@ -66,7 +66,9 @@ def data_frame_unknown(state: TreeState) -> Iterator[Finding]:
             name for name in frames if name.rpartition("/")[2] == plain.rpartition("/")[2]
         )
         if prefixed:
-            advice = f"is it meant to be {listed(prefixed)}? A frame_prefix is on one side only"
+            advice = (
+                f"is it meant to be {list_names(prefixed)}? A frame_prefix is on one side only"
+            )
         if plain in frames:
             message = (
                 f"{each.topic} from {who_sends} is in the frame {each.frame}: tf2 refuses names"
@@ -80,7 +82,7 @@ def data_beyond_tf(state: TreeState) -> Iterator[Finding]:
     """The stamps of data and of the tree do not meet: every lookup for them extrapolates."""
     simulated = state.simulated
     for each in state.stamped:
-        sender = listed(each.nodes) or "somebody"
+        sender = list_names(each.nodes) or "somebody"
         for lack_s, age_s, edge in _latest_above(state, each):
             fault = _off_clock(state, each, edge, age_s, simulated=simulated)
             if fault:

@@ -62,7 +62,7 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
     tree.loop,
     tree.second_parent,
     tree.two_trees,
-    publishers.flooded,
+    publishers.find_floods,
     publishers.two_publishers,
     publishers.both_topics,
     verify.differs_from_plan,
@@ -72,10 +72,10 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
     stamps.host_clock_off,
     stamps.stamps_ahead,
     consumers.late_stamps,
-    stamps.stamp_repeated,
+    stamps.find_repeated_stamps,
     stamps.stamp_went_back,
     rates.fell_silent,
-    rates.fixed_left,
+    rates.find_fixed_left,
     rates.low_rate,
     rates.gap,
     consumers.data_frame_unknown,
@@ -89,8 +89,8 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
 
 def diagnose(state: TreeState) -> list[Finding]:
     """Return everything that is wrong, errors first, else in the order of the checks."""
-    found = [finding for diagnosis in DIAGNOSES for finding in diagnosis(state)]
-    return sorted(dict.fromkeys(found), key=lambda finding: finding.severity)
+    findings = [finding for diagnosis in DIAGNOSES for finding in diagnosis(state)]
+    return sorted(dict.fromkeys(findings), key=lambda finding: finding.severity)
 
 
 def examine(states: Sequence[TreeState]) -> Diagnosis:
@@ -101,7 +101,10 @@ def examine(states: Sequence[TreeState]) -> Diagnosis:
     roots = tuple(dict.fromkeys(root for state in states for root in tree.trees_of(state)))
     own = {topic for state in states for topic in state.topics}
     with_tf = [
-        topic.name for state in states[:1] for topic in state.typed(TF_MESSAGE) if topic.publishers
+        topic.name
+        for state in states[:1]
+        for topic in state.topics_of_type(TF_MESSAGE)
+        if topic.publishers
     ]
     elsewhere = tuple(name for name in with_tf if name not in own and "/_" not in name)
     seconds = states[0].seconds if states else 0.0

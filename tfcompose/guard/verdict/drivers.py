@@ -110,7 +110,7 @@ def is_off(expected: Expected, sent: Pose) -> bool:
 
 
 def driver_pose_differs(
-    node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None
+    node: str, off: Sequence[tuple[Expected, Pose]], span: Span | None = None
 ) -> Finding:
     """Return the finding for a sensor's frames that its driver sends with other poses."""
     (expected, sent), *others = off
@@ -131,7 +131,7 @@ def driver_pose_differs(
     advice = (
         f"is {driven.sensor} another model? If these are this unit's values, write them: {values}"
     )
-    return finding("TF828", message, place, help=advice, notes=notes, severity="warning")
+    return finding("TF828", message, span, help=advice, notes=notes, severity="warning")
 
 
 def _row(values: tuple[float, ...]) -> str:

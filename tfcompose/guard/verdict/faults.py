@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import listed, plural
+from tfcompose.foundation.text import list_names, plural
 from tfcompose.guard.verdict import publishers, stamps, tree
 from tfcompose.guard.verdict.simulators import switch_of_simulator
 from tfcompose.model.plan import PlanEdge  # noqa: TC001 (faults are decoded by their types)
@@ -188,17 +188,17 @@ def group_of(
     return FaultGroup(faults, plan, runs, driven, process)
 
 
-def fault_finding(group: FaultGroup, place: Span | None = None) -> Finding:
-    """Return the finding for a group; ``place`` is the span of the first edge."""
+def fault_finding(group: FaultGroup, span: Span | None = None) -> Finding:
+    """Return the finding for a group; ``span`` is the span of the first edge."""
     first = group.first
     is_mild = first.code in _WARNINGS or (
         first.code == UNDECLARED and group.plan.guard.unknown_edges == "warn"
     )
     severity: Severity = "warning" if is_mild else "error"
-    notes = [*_edge_notes(group), *([] if place else _declared_notes(first)), *_run_notes(group)]
+    notes = [*_edge_notes(group), *([] if span else _declared_notes(first)), *_run_notes(group)]
     message, advice = _SENTENCES[first.code](group)
     advice = _misnamed_help(group) or _driver_help(group) or _switch_help(group) or advice
-    return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
+    return finding(first.code, message, span, help=advice, notes=notes, severity=severity)
 
 
 # The message and the help of each code.
@@ -217,7 +217,7 @@ def _wrong_parent(group: FaultGroup) -> tuple[str, str]:
     first, edge = group.first, group.first.edge
     if edge is None:
         raise ValueError(first)
-    message, owner = _sent_by_driver(group), f"{edge.owner} ({edge.node})"
+    message, owner = _driver_message(group), f"{edge.owner} ({edge.node})"
     if not message and (first.recorded or first.is_owners):
         by = f"its owner {owner} publishes {group.edges}"
         by = f"{group.edges} is recorded" if first.recorded else by
@@ -234,7 +234,7 @@ def _wrong_parent(group: FaultGroup) -> tuple[str, str]:
 def _undeclared_text(group: FaultGroup) -> tuple[str, str]:
     first = group.first
     by = "recorded" if first.recorded else f"published by {first.who}"
-    message = _sent_by_driver(group) or f"{group.edges} {group.are} {by}, but not declared"
+    message = _driver_message(group) or f"{group.edges} {group.are} {by}, but not declared"
     allowed = f"{{parent: {first.parent}, child: {_child_pattern(group)}}}"
     return message, f"declare it under frames, or allow it: guard: {{allow: [{allowed}]}}"
 
@@ -319,12 +319,12 @@ def other_robot_finding(faults: Sequence[Fault], run: OtherRun, plan: Plan) -> F
     children = list(dict.fromkeys(fault.child for fault in faults))
     message = (
         f"{run.name} (pid {run.pid}, since {run.since}) runs in this domain: it publishes"
-        f" {listed(children)}"
+        f" {list_names(children)}"
     )
     nodes = dict.fromkeys(node for fault in faults for node in fault.nodes)
     shared = dict.fromkeys(fault.child for fault in faults if fault.edge is not None)
-    notes = [Note(f"its nodes are {listed(nodes)}")] if nodes else []
-    notes += [Note(f"both robots have {listed(shared)}")] if shared else []
+    notes = [Note(f"its nodes are {list_names(nodes)}")] if nodes else []
+    notes += [Note(f"both robots have {list_names(shared)}")] if shared else []
     advice = (
         f"end it: tfcompose down --robot {run.name}; or keep them apart: ros: {{domain_id:"
         " N}, or ros: {namespace: NAME, isolate: topics}"
@@ -396,7 +396,7 @@ def _is_driver_otherwise(group: FaultGroup) -> bool:
     return is_publisher and first.code in _OTHERWISE and is_own
 
 
-def _sent_by_driver(group: FaultGroup) -> str:
+def _driver_message(group: FaultGroup) -> str:
     """Return the message for frames that a driver sends otherwise than its preset has them."""
     if group.driven is None or not _is_driver_otherwise(group):
         return ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding, nearest
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.guard.verdict.publishers import TOGETHER_S, two_publishers_message
 from tfcompose.tf.live.state import MovingJoint
 from tfcompose.tf.ros.joint_codec import JOINT_STATE_TYPE
@@ -36,11 +36,11 @@ def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
         ):
             continue
         message = (
-            f"{listed(topic.publishers)} publishes {topic.name}, and no node that publishes TF"
+            f"{list_names(topic.publishers)} publishes {topic.name}, and no node that publishes TF"
             " listens to it"
         )
         notes = (
-            [Note(f"missing: {listed([f'{j.parent} → {j.child}' for j in missing])}")]
+            [Note(f"missing: {list_names([f'{j.parent} → {j.child}' for j in missing])}")]
             if missing
             else []
         )
@@ -58,9 +58,10 @@ def no_joint_states(state: TreeState) -> Iterator[Finding]:
         nodes = _transformers(state, topic)
         if topic.publishers or not nodes or not missing:
             continue
-        edges = listed([f"{joint.parent} → {joint.child}" for joint in missing])
+        edges = list_names([f"{joint.parent} → {joint.child}" for joint in missing])
         message = (
-            f"{listed(nodes)} waits for {topic.name}, which no node publishes; missing: {edges}"
+            f"{list_names(nodes)} waits for {topic.name}, which no node publishes;"
+            f" missing: {edges}"
         )
         yield finding("TF843", message, None, help=_sender_help(state))
 
@@ -91,15 +92,15 @@ def joint_without_state(state: TreeState) -> Iterator[Finding]:
     heard = [topic for topic in _joint_topics(state) if _transformers(state, topic)]
     if absent and heard:
         message = (
-            f"{listed([joint.name for joint in absent])}: no state on"
-            f" {listed([topic.name for topic in heard])}"
+            f"{list_names([joint.name for joint in absent])}: no state on"
+            f" {list_names([topic.name for topic in heard])}"
         )
         notes = [
-            Note(f"missing: {listed([f'{joint.parent} → {joint.child}' for joint in absent])}")
+            Note(f"missing: {list_names([f'{joint.parent} → {joint.child}' for joint in absent])}")
         ]
         advice = (
-            f"{listed([node for topic in heard for node in topic.publishers])} should send them:"
-            " is a joint misspelt?"
+            f"{list_names([node for topic in heard for node in topic.publishers])} should send"
+            " them: is a joint misspelt?"
         )
         yield finding("TF844", message, None, notes=notes, help=advice)
 
@@ -130,12 +131,16 @@ def _joint_topics(state: TreeState) -> list[TopicState]:
     A robot beside has TF topics of its own, in a namespace below this one's.
     """
     own = _namespace(state.topics[0])
-    spaces = {_namespace(topic.name) for topic in state.typed(TF_MESSAGE) if topic.publishers}
+    spaces = {
+        _namespace(topic.name) for topic in state.topics_of_type(TF_MESSAGE) if topic.publishers
+    }
     neighbours = tuple(
         f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/")
     )
     named = [
-        topic for topic in state.typed(JOINT_STATE_TYPE) if topic.name.endswith("/joint_states")
+        topic
+        for topic in state.topics_of_type(JOINT_STATE_TYPE)
+        if topic.name.endswith("/joint_states")
     ]
     return [
         topic
@@ -160,7 +165,7 @@ def joint_senders(state: TreeState) -> Iterator[Finding]:
     """A joint has the states of two publishers, or the robot has no such joint."""
     heard = {topic.name for topic in _joint_topics(state)}
     senders = [sender for sender in state.sent_joints if sender.topic in heard]
-    yield from sent_twice(senders)
+    yield from find_sent_twice(senders)
     yield from unknown_joints(senders, known_joints(state))
 
 
@@ -175,7 +180,7 @@ def planned_joints(plan: Plan) -> frozenset[str]:
     return frozenset(edge.joint.name for edge in plan.edges if edge.joint is not None)
 
 
-def sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
+def find_sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
     """Find joints of which several publishers of a topic send states at the same time."""
     shared: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for topic in dict.fromkeys(sender.topic for sender in senders):
@@ -186,7 +191,7 @@ def sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
                 nodes = tuple(sorted(sender.node for sender in some))
                 shared.setdefault((topic, nodes), []).append(joint)
     for (topic, nodes), joints in shared.items():
-        named = listed(joints, _NAMED_AT_MOST)
+        named = list_names(joints, _NAMED_AT_MOST)
         message = two_publishers_message(named, nodes, are_many=len(joints) > 1)
         yield finding(
             "TF860",
@@ -223,8 +228,8 @@ def unknown_joints(senders: Sequence[SentJoints], known: Collection[str]) -> Ite
         ]
         yield finding(
             "TF861",
-            f"{sender.node} sends {listed(unknown, _NAMED_AT_MOST)} on {sender.topic}; the robot"
-            f" has no such joint{'s' if len(unknown) > 1 else ''}",
+            f"{sender.node} sends {list_names(unknown, _NAMED_AT_MOST)} on {sender.topic}; the"
+            f" robot has no such joint{'s' if len(unknown) > 1 else ''}",
             None,
             help=" ".join(near)
             or "correct the name where the node is configured, or describe the joint",

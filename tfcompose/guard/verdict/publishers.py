@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.geometry import Offset, Pose, normalise, offset_of
-from tfcompose.foundation.text import listed, plural, with_more
+from tfcompose.foundation.text import list_names, plural, with_more
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live.state import NAMELESS, who
 from tfcompose.tf.ros.environment import PROFILE_VARIABLES
@@ -80,7 +80,7 @@ def flood(node: str, where: str, transforms: int, hertz: float | None) -> Findin
     )
 
 
-def flooded(state: TreeState) -> Iterator[Finding]:
+def find_floods(state: TreeState) -> Iterator[Finding]:
     """A node publishes more edges than are kept."""
     named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.beyond.items():
@@ -100,7 +100,9 @@ def flooded(state: TreeState) -> Iterator[Finding]:
         )
 
 
-def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: bool) -> Finding:
+def unfenced_finding(
+    node: str, process: str, topic: str, profile: str, *, remapped: bool
+) -> Finding:
     """Return the finding for a process of a strict plan outside its isolation.
 
     ``profile`` is the profile file that it was started with instead of the fence's; empty: none.
@@ -135,7 +137,7 @@ def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: boo
     return finding("TF852", message, None, notes=notes, help=advice)
 
 
-def unmarked(node: str, topic: str, where: str, *, remapped: bool) -> Finding:
+def unmarked_finding(node: str, topic: str, where: str, *, remapped: bool) -> Finding:
     """Return the finding for a process of a strict plan's run whose environment was cleared.
 
     It runs ``where``, and is not behind the fence, which may be of remappings.
@@ -171,9 +173,9 @@ def leak(node: str, topic: str, own: str) -> Finding:
     return finding("TF827", message, None, help=advice)
 
 
-def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Finding:
+def replaced_latched_finding(node: str, sent_before: int, missing: Sequence[str]) -> Finding:
     """Return the finding for a publisher whose last latched message lacks these edges."""
-    lost, named = plural(sent_before, "message"), listed(missing, LISTED_AT_MOST)
+    lost, named = plural(sent_before, "message"), list_names(missing, LISTED_AT_MOST)
     message = (
         f"{node} sent {lost} on /tf_static before the guard received it, and none since contains"
         f" {named}"
@@ -187,7 +189,7 @@ def volatile_publisher(node: str, topic: str, owned: Sequence[str]) -> Finding:
 
     ``owned`` are its edges.
     """
-    notes = [Note(f"it owns {listed(owned, LISTED_AT_MOST)}")] if owned else []
+    notes = [Note(f"it owns {list_names(owned, LISTED_AT_MOST)}")] if owned else []
     message = f"{node} publishes {topic} with durability volatile, so no listener receives it"
     return finding(
         "TF806",
@@ -274,7 +276,7 @@ def volatile_reader(state: TreeState) -> Iterator[Finding]:
     if state.volatile_readers and any(publisher.static for publisher in state.publishers):
         listen = "listens" if len(state.volatile_readers) == 1 else "listen"
         message = (
-            f"{listed(state.volatile_readers)} {listen} to {state.topics[1]} with durability"
+            f"{list_names(state.volatile_readers)} {listen} to {state.topics[1]} with durability"
             " volatile: "
         )
         message += "earlier messages are missed"
@@ -299,8 +301,8 @@ def other_type(state: TreeState) -> Iterator[Finding]:
     for topic in state.graph:
         if topic.name in state.topics and topic.type != TF_MESSAGE and topic.publishers:
             message = (
-                f"{listed(topic.publishers)} publishes {topic.type} on {topic.name}, and listeners"
-                " ask for "
+                f"{list_names(topic.publishers)} publishes {topic.type} on {topic.name}, and"
+                " listeners ask for "
             )
             message += TF_MESSAGE
             yield finding(
@@ -317,7 +319,9 @@ def unreadable(state: TreeState) -> Iterator[Finding]:
     for gid, number in state.malformed.items():
         sender = named.get(gid) if gid is not None else None
         node, topic = (
-            (sender.node or NAMELESS, sender.topic) if sender else (NAMELESS, listed(state.topics))
+            (sender.node or NAMELESS, sender.topic)
+            if sender
+            else (NAMELESS, list_names(state.topics))
         )
         message = (
             f"{plural(number, 'message')} on {topic} from {node} cannot be read as {TF_MESSAGE}"
@@ -341,13 +345,13 @@ def many_static(state: TreeState) -> Iterator[Finding]:
         )
         advice = "let one node publish them: tfcompose sends all fixed edges in one message"
         yield finding(
-            "TF309", message, None, severity="error", notes=[Note(listed(nodes))], help=advice
+            "TF309", message, None, severity="error", notes=[Note(list_names(nodes))], help=advice
         )
 
 
 def isolation_leak(state: TreeState) -> Iterator[Finding]:
     """A node of a robot with separate TF topics publishes on the global ones."""
-    topics = {topic.name: topic for topic in state.typed(TF_MESSAGE)}
+    topics = {topic.name: topic for topic in state.topics_of_type(TF_MESSAGE)}
     own = (
         {node for process in state.plan.processes for node in process.nodes}
         if state.plan
@@ -408,13 +412,13 @@ def compare(expected: Pose, observed: Pose) -> str:
 
 
 def pose_differs(
-    off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None
+    off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, span: Span | None = None
 ) -> Finding:
     """Return the finding for edges that come with another pose than the plan's.
 
     Each with its parent, as it was sent.
 
-    ``publisher`` is empty where it is not known; ``place`` is where the first edge is in the
+    ``publisher`` is empty where it is not known; ``span`` is where the first edge is in the
     robot's file.
     """
     (edge, parent, pose), *others = off
@@ -432,12 +436,12 @@ def pose_differs(
         for edge, above, sent in others[:LISTED_AT_MOST]
     ]
     notes += (
-        [] if place else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
+        [] if span else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
     )
     advice = (
         "if the file changed after the start, run tfcompose up again: it restarts the processes"
         " that differ; otherwise correct the wrong one"
     )
     return finding(
-        "TF846", f"{message}: {compare(edge.pose, pose)}", place, notes=notes, help=advice
+        "TF846", f"{message}: {compare(edge.pose, pose)}", span, notes=notes, help=advice
     )

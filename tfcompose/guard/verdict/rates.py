@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import duration, listed, with_more
+from tfcompose.foundation.text import duration, list_names, with_more
 from tfcompose.model.plan import silent_after_s
 from tfcompose.tf.live.arrivals import KEPT_NS
 from tfcompose.tf.live.state import who
@@ -39,7 +39,9 @@ NAMED_AT_MOST = 6
 # Edges of a plan; ``place`` is where the first one is in the robot's file.
 
 
-def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Finding:
+def never_received_finding(
+    edges: Sequence[PlanEdge], advice: str, span: Span | None = None
+) -> Finding:
     """Return the finding for edges of one owner that were not received."""
     are_many = len(edges) > 1
     named = with_more(edges[0].name, len(edges) - 1)
@@ -50,8 +52,8 @@ def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = 
     return finding(
         "TF811",
         message + _owner(edges[0]),
-        place,
-        notes=[] if place else _declared_notes(edges),
+        span,
+        notes=[] if span else _declared_notes(edges),
         help=advice,
     )
 
@@ -59,7 +61,7 @@ def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = 
 def silent(
     edges: Sequence[PlanEdge],
     silence_s: float,
-    place: Span | None = None,
+    span: Span | None = None,
     *,
     over: bool = False,
     gone: bool = False,
@@ -75,35 +77,35 @@ def silent(
         first.node,
         names,
         silence_s,
-        place,
+        span,
         over=over,
         gone=gone,
-        notes=_rate_notes(first, place),
+        notes=_rate_notes(first, span),
     )
 
 
-def owner_left(edges: Sequence[PlanEdge], place: Span | None = None) -> Finding:
+def owner_left(edges: Sequence[PlanEdge], span: Span | None = None) -> Finding:
     """Return the finding for fixed edges whose owner has left."""
-    return _unlatched_finding(_owner(edges[0]), [edge.name for edge in edges], place)
+    return _unlatched_finding(_owner(edges[0]), [edge.name for edge in edges], span)
 
 
 def slow(
     edges: Sequence[PlanEdge],
     rate: float,
-    place: Span | None = None,
+    span: Span | None = None,
     severity: Severity = "warning",
 ) -> Finding:
     """Return the finding for edges of one owner that come with ``rate`` hertz."""
     first = edges[0]
     come = "comes" if len(edges) == 1 else "come"
-    named = listed([edge.name for edge in edges])
+    named = list_names([edge.name for edge in edges])
     message = (
         f"{named} {come} at {rate:.3g} Hz from {_owner(first)}, but {first.rate or 0.0:g} Hz is"
         " declared"
     )
-    notes = [] if place else _declared_notes(edges[:1])
+    notes = [] if span else _declared_notes(edges[:1])
     advice = "raise its rate, or declare the rate that it has"
-    return finding("TF805", message, place, severity=severity, notes=notes, help=advice)
+    return finding("TF805", message, span, severity=severity, notes=notes, help=advice)
 
 
 def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are named)
@@ -111,14 +113,14 @@ def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are na
     node: str,
     names: Sequence[str],
     silence_s: float,
-    place: Span | None = None,
+    span: Span | None = None,
     *,
     over: bool = False,
     gone: bool = False,
     notes: Sequence[Note] = (),
 ) -> Finding:
     what = "was silent" if over else "has left" if gone else "fell silent"
-    message = f"{publisher} {what}: nothing on {listed(names)} for {duration(silence_s)}"
+    message = f"{publisher} {what}: nothing on {list_names(names)} for {duration(silence_s)}"
     advice = f"is {node} still running, and does it get its data?"
     if gone:
         advice = f"start {node} again, and find out why it ended"
@@ -127,24 +129,24 @@ def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are na
             f"what held {node} up? An overloaded machine or network does, or a callback that"
             " blocks"
         )
-    return finding("TF804", message, place, notes=notes, help=advice)
+    return finding("TF804", message, span, notes=notes, help=advice)
 
 
-def _unlatched_finding(publisher: str, names: Sequence[str], place: Span | None = None) -> Finding:
-    message = f"{publisher} has left: no node latches {listed(names)} any more"
+def _unlatched_finding(publisher: str, names: Sequence[str], span: Span | None = None) -> Finding:
+    message = f"{publisher} has left: no node latches {list_names(names)} any more"
     advice = "current listeners keep these frames; later ones do not get them"
-    return finding("TF804", message, place, help=advice)
+    return finding("TF804", message, span, help=advice)
 
 
 def _owner(edge: PlanEdge) -> str:
     return f"{edge.owner} ({edge.node})"
 
 
-def _rate_notes(edge: PlanEdge, place: Span | None) -> list[Note]:
+def _rate_notes(edge: PlanEdge, span: Span | None) -> list[Note]:
     if not edge.rate:
         return []
     declared = f"declared at {edge.rate:g} Hz"
-    return [Note(declared if place else f"{declared} in {edge.source[0]}:{edge.source[1]}")]
+    return [Note(declared if span else f"{declared} in {edge.source[0]}:{edge.source[1]}")]
 
 
 def _declared_notes(edges: Sequence[PlanEdge]) -> list[Note]:
@@ -223,7 +225,7 @@ def fell_silent(state: TreeState) -> Iterator[Finding]:
         yield _silence(who(edge), who(edge), [edge.name], edge.age_s, gone=edge.present is False)
 
 
-def fixed_left(state: TreeState) -> Iterator[Finding]:
+def find_fixed_left(state: TreeState) -> Iterator[Finding]:
     """Fixed edges were there, but the publisher that latched them has left."""
     held = {edge.child for edge in state.taken if edge.stream.static and edge.present is not False}
     held |= state.planned

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import listed, plural
+from tfcompose.foundation.text import list_names, plural
 from tfcompose.model.plan.topics import namespace_options
 from tfcompose.tf.ros.environment import DOMAIN, RANGE, RMW
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
@@ -35,7 +35,7 @@ def settings_text(settings: Mapping[str, str]) -> str:
 def elsewhere_help(elsewhere: Sequence[str]) -> str:
     """Return the help for missing TF, depending on TF on other topics."""
     if elsewhere:
-        return f"there is TF on {listed(elsewhere)}: {namespace_options(elsewhere)}"
+        return f"there is TF on {list_names(elsewhere)}: {namespace_options(elsewhere)}"
     return "is the robot running, and with these settings? tfcompose doctor looks for the reason"
 
 
@@ -47,7 +47,7 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
     others = plural(len(state.nodes), "other node") if state.nodes else "no other node"
     message = f"no node publishes {moving} or {fixed}; in {state.seconds:.1f} s {others} "
     message += "was found" if len(state.nodes) < 2 else "were found"  # noqa: PLR2004 (one, or none)
-    notes = [Note(f"seen: {listed(state.nodes)}")] if state.nodes else []
+    notes = [Note(f"seen: {list_names(state.nodes)}")] if state.nodes else []
     notes.append(Note(f"looked with {settings_text(state.settings)}"))
     if state.plan:
         notes.append(
@@ -55,7 +55,7 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
         )
     elsewhere = _elsewhere(state)
     if elsewhere:
-        notes.append(Note(f"there is TF on {listed(elsewhere)}"))
+        notes.append(Note(f"there is TF on {list_names(elsewhere)}"))
         advice = f"look there: tfcompose doctor {namespace_options(elsewhere)}"
     elif state.plan and not state.nodes:
         advice = (
@@ -118,7 +118,7 @@ def _elsewhere(state: TreeState) -> list[str]:
     """Return the topics with TF that are not observed."""
     return [
         topic.name
-        for topic in state.typed(TF_MESSAGE)
+        for topic in state.topics_of_type(TF_MESSAGE)
         if topic.publishers and topic.name not in state.topics
     ]
 

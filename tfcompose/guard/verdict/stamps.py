@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import duration, listed, plural, with_more
+from tfcompose.foundation.text import duration, list_names, plural, with_more
 from tfcompose.tf.live.arrivals import KEPT_NS
 from tfcompose.tf.live.state import who
 
@@ -271,7 +271,7 @@ class StampHistory:
 # At the end.
 
 
-def stamp_repeated(state: TreeState) -> Iterator[Finding]:
+def find_repeated_stamps(state: TreeState) -> Iterator[Finding]:
     """A publisher sends an edge with the same stamp again and again."""
 
     def repeats(edge: EdgeState) -> bool:
@@ -334,13 +334,12 @@ def host_clock_off(state: TreeState) -> Iterator[Finding]:
         there = f" {where}" if where else ""
         if ahead:
             message = (
-                f"the clock of {listed(nodes)}{there} is {duration(skew)} ahead of this machine's"
-                f"{offset_name(skew)}"
+                f"the clock of {list_names(nodes)}{there} is {duration(skew)} ahead of this"
+                f" machine's{offset_name(skew)}"
             )
         else:
-            message = (
-                f"messages of {listed(nodes)}{there} arrive {duration(skew)} after they were sent"
-            )
+            late = f"{duration(skew)} after they were sent"
+            message = f"messages of {list_names(nodes)}{there} arrive {late}"
         advice = (
             "bring the machines' clocks together (chrony, or timedatectl set-ntp true); stamps"
             " differ by as much"
@@ -376,9 +375,8 @@ def clock_missing(state: TreeState) -> Iterator[Finding]:
             topic.readers or (state.plan and state.plan.ros.clock == "sim")
         ):
             continue
-        users = (
-            f"{listed(topic.readers)} {'use' if len(topic.readers) > 1 else 'uses'} simulated time"
-        )
+        verb = "use" if len(topic.readers) > 1 else "uses"
+        users = f"{list_names(topic.readers)} {verb} simulated time"
         users = users if topic.readers else "the plan's clock is sim"
         if not topic.publishers:
             message = f"{users}, but no node publishes /clock"
@@ -390,7 +388,7 @@ def clock_missing(state: TreeState) -> Iterator[Finding]:
                 if state.clock_ns is None
                 else f"is stuck at {state.clock_ns / 1e9:.3f} s"
             )
-            message = f"{users}, and /clock from {listed(topic.publishers)} {stuck}"
+            message = f"{users}, and /clock from {list_names(topic.publishers)} {stuck}"
             yield finding(
                 "TF836", message, None, help="is the simulator paused, or the bag at its end?"
             )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding, slip_of
 from tfcompose.foundation.geometry import norm
-from tfcompose.foundation.text import listed, with_more
+from tfcompose.foundation.text import list_names, with_more
 from tfcompose.foundation.tree import loops, trees
 from tfcompose.tf.live.edges import LEAST_LENGTH
 from tfcompose.tf.live.state import who
@@ -68,7 +68,7 @@ def two_parents_message(child: str, parents: Sequence[tuple[str, str]]) -> str:
     ]
     if len(each) == 2:  # noqa: PLR2004 (two)
         return f"{child} has two parents: {' and '.join(each)}"
-    return f"{child} has {len(each)} parents: {listed(each)}"
+    return f"{child} has {len(each)} parents: {list_names(each)}"
 
 
 # At the end.
@@ -184,7 +184,9 @@ def two_trees(state: TreeState) -> Iterator[Finding]:
             continue  # a frame with two parents connects them, and is a finding of its own
         message = f"nothing connects {_tree(root, found[root])} with {_tree(first, found[first])}"
         publishers = {who(edge): None for edge in state.taken if edge.child in found[root]}
-        notes = [Note(f"{root} and what is below it is published by {listed(list(publishers))}")]
+        notes = [
+            Note(f"{root} and what is below it is published by {list_names(list(publishers))}")
+        ]
         yield finding(
             "TF830",
             message,
@@ -229,7 +231,7 @@ def _bridge(state: TreeState, root: str, main: set[str], own: set[str]) -> str:
 
 def _tree(root: str, frames: set[str]) -> str:
     some = sorted(frames - {root})
-    return f"the tree below {root} ({listed(some)})"
+    return f"the tree below {root} ({list_names(some)})"
 
 
 def _describe_edge(state: TreeState, edge: EdgeState) -> str:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, did_you_mean
 from tfcompose.foundation.geometry import Offset, Pose, offset_of
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.guard.verdict.consumers import late_stamps
 from tfcompose.guard.verdict.drivers import (
     Expected,
@@ -28,11 +28,16 @@ from tfcompose.guard.verdict.drivers import (
     is_off,
 )
 from tfcompose.guard.verdict.faults import SELF, Fault, fault_finding, group_of, sensor_of
-from tfcompose.guard.verdict.joints import planned_joints, sent_twice, unknown_joints
+from tfcompose.guard.verdict.joints import find_sent_twice, planned_joints, unknown_joints
 from tfcompose.guard.verdict.ownership import code_of, may_be_owners, relays_of
-from tfcompose.guard.verdict.publishers import SAME_POSE, flooded, pose_differs, volatile_static
-from tfcompose.guard.verdict.rates import never_received, owner_left, silent, slow
-from tfcompose.guard.verdict.stamps import stamp_repeated, stamps_ahead, wrong_clock
+from tfcompose.guard.verdict.publishers import (
+    SAME_POSE,
+    find_floods,
+    pose_differs,
+    volatile_static,
+)
+from tfcompose.guard.verdict.rates import never_received_finding, owner_left, silent, slow
+from tfcompose.guard.verdict.stamps import find_repeated_stamps, stamps_ahead, wrong_clock
 from tfcompose.guard.verdict.tree import loop, rejected_transforms
 from tfcompose.model.plan.stock import stand_ins
 from tfcompose.model.plan.topics import parts_of
@@ -82,7 +87,9 @@ class Difference:
 def differences(state: TreeState, plan: Plan, tolerance: Offset = SAME_POSE) -> list[Difference]:
     """Return the differences from the plan: its edges in order, then undeclared ones."""
     comparison = _Comparison(state, plan, tolerance)
-    planned = [difference for edge in plan.edges for difference in comparison.of_planned(edge)]
+    planned = [
+        difference for edge in plan.edges for difference in comparison.compare_planned(edge)
+    ]
     return [*planned, *comparison.find_undeclared()]
 
 
@@ -119,7 +126,7 @@ class _Comparison:
     def drivers(self) -> dict[str, Expected]:
         return expected_frames(self.plan)
 
-    def of_planned(self, edge: PlanEdge) -> Iterator[Difference]:
+    def compare_planned(self, edge: PlanEdge) -> Iterator[Difference]:
         some = self.by_child.get(edge.child, [])
         for observed in some:
             yield from self._fault(edge, observed)
@@ -148,7 +155,7 @@ class _Comparison:
         planned = {edge.child for edge in self.plan.edges}
         for edge in self.state.edges:
             stream = edge.stream
-            if stream.child in planned or self.plan.may_be_undeclared(stream.parent, stream.child):
+            if stream.child in planned or self.plan.allows_undeclared(stream.parent, stream.child):
                 continue
             yield self._faulty("TF803", None, edge)
 
@@ -300,34 +307,34 @@ def group_finding(
     group: Group,
     state: TreeState,
     plan: Plan,
-    place: Span | None = None,
+    span: Span | None = None,
     slow_is: Severity = "warning",
 ) -> Finding:
     """Return the finding for differences of one group.
 
-    ``place`` is where the first edge is in the robot's file.
+    ``span`` is where the first edge is in the robot's file.
     """
     first = group[0]
-    found = (
-        _fault_finding(group, state, plan, place)
+    finding = (
+        _fault_finding(group, state, plan, span)
         if first.fault
-        else _difference_finding(group, state, plan, place, slow_is)
+        else _difference_finding(group, state, plan, span, slow_is)
     )
     # Of a recording nobody can mend what its nodes did.
     return (
-        replace(found, help="")
+        replace(finding, help="")
         if state.recorded and first.code in {"TF804", "TF805", "TF846"}
-        else found
+        else finding
     )
 
 
 def _difference_finding(
-    group: Group, state: TreeState, plan: Plan, place: Span | None, slow_is: Severity
+    group: Group, state: TreeState, plan: Plan, span: Span | None, slow_is: Severity
 ) -> Finding:
     first = group[0]
     edges = [difference.edge for difference in group if difference.edge is not None]
     if first.live is None:
-        return never_received(edges, missing_help(state, plan, edges[0]), place)
+        return never_received_finding(edges, missing_help(state, plan, edges[0]), span)
     stream = first.live.stream
     if first.driver is not None:
         off = [
@@ -335,21 +342,21 @@ def _difference_finding(
             for difference in group
             if difference.driver is not None and difference.live is not None
         ]
-        return driver_pose_differs(first.live.publisher, off, place)
+        return driver_pose_differs(first.live.publisher, off, span)
     if first.off is not None:
-        return _poses(group, place)
+        return _poses(group, span)
     if first.code == "TF805":
         return slow(
             edges,
             min(difference.live.timing.rate or 0.0 for difference in group if difference.live),
-            place,
+            span,
             slow_is,
         )
     if stream.static:
-        return owner_left(edges, place)
+        return owner_left(edges, span)
     gone = first.live.present is False
     return silent(
-        edges, max(difference.silence_s for difference in group), place, over=first.over, gone=gone
+        edges, max(difference.silence_s for difference in group), span, over=first.over, gone=gone
     )
 
 
@@ -377,14 +384,14 @@ def _key(difference: Difference) -> tuple[object, ...]:
     )
 
 
-def _fault_finding(group: Group, state: TreeState, plan: Plan, place: Span | None) -> Finding:
+def _fault_finding(group: Group, state: TreeState, plan: Plan, span: Span | None) -> Finding:
     faults = [difference.fault for difference in group if difference.fault is not None]
     runs = dict.fromkeys(state.where(difference.live) for difference in group if difference.live)
     driven = sensor_of(faults[0], drives_of(plan))
-    found = fault_finding(group_of(faults, plan, list(runs), driven), place)
-    found = replace(found, notes=(*found.notes, *_elsewhere(group)))
+    finding = fault_finding(group_of(faults, plan, list(runs), driven), span)
+    finding = replace(finding, notes=(*finding.notes, *_elsewhere(group)))
     if not faults[0].namesake:
-        return found
+        return finding
     gids = {difference.live.stream.gid for difference in group if difference.live}
     others = [
         publisher
@@ -392,7 +399,7 @@ def _fault_finding(group: Group, state: TreeState, plan: Plan, place: Span | Non
         if publisher.node in faults[0].nodes and publisher.gid not in gids and publisher.where
     ]
     notes = [Note(f"{publisher.node} runs {publisher.where}") for publisher in others]
-    return replace(found, notes=(*found.notes, *dict.fromkeys(notes)))
+    return replace(finding, notes=(*finding.notes, *dict.fromkeys(notes)))
 
 
 def _elsewhere(group: Group) -> list[Note]:
@@ -413,14 +420,14 @@ def _elsewhere(group: Group) -> list[Note]:
     )
 
 
-def _poses(group: Group, place: Span | None) -> Finding:
+def _poses(group: Group, span: Span | None) -> Finding:
     off = [
         (difference.edge, difference.live.parent, difference.live.stream.pose)
         for difference in group
         if difference.edge and difference.live
     ]
     publisher = group[0].live.publisher if group[0].live else ""
-    return pose_differs(off, publisher, place)
+    return pose_differs(off, publisher, span)
 
 
 # Of a whole plan.
@@ -446,7 +453,7 @@ class Verdict:
 
     edge: str
     owner: str | None
-    found: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
 
 
 def verify(
@@ -469,8 +476,8 @@ def verify(
                 found[edge.child] += _wrong_times(edge, state, part)
         for difference in differences(state, part, tolerance):
             # The parts of a plan differ in their edges only; a process is looked up in the whole.
-            place = (places or {}).get(difference.edge.child) if difference.edge else None
-            reported = group_finding([difference], state, plan, place, slow_is="error")
+            span = (places or {}).get(difference.edge.child) if difference.edge else None
+            reported = group_finding([difference], state, plan, span, slow_is="error")
             if difference.edge is None and difference.live is not None:
                 extra.append(Verdict(difference.live.name, None, (reported,)))
             elif difference.edge is not None:
@@ -479,15 +486,15 @@ def verify(
         switched = {edge.child for edge in part.edges if edge.switched}
         lasting = tuple(edge for edge in state.edges if edge.child not in switched)
         in_all = (
-            *flooded(state),
+            *find_floods(state),
             *loop(replace(state, edges=lasting)),
             *volatile_static(state),
         )
-        extra += [Verdict(listed(state.topics), "", (finding,)) for finding in in_all]
+        extra += [Verdict(list_names(state.topics), "", (finding,)) for finding in in_all]
     sent = list(dict.fromkeys(joint for each in observers.values() for joint in each.sent_joints))
-    of_joints = (*sent_twice(sent), *unknown_joints(sent, planned_joints(plan)))
+    of_joints = (*find_sent_twice(sent), *unknown_joints(sent, planned_joints(plan)))
     extra += [
-        Verdict(listed({each.topic for each in sent}), "", (finding,)) for finding in of_joints
+        Verdict(list_names({each.topic for each in sent}), "", (finding,)) for finding in of_joints
     ]
     return [
         *(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges),
@@ -510,12 +517,12 @@ def _wrong_times(edge: EdgeState, state: TreeState, plan: Plan) -> Iterator[Find
         return
     alone = replace(state, edges=(edge,))
     yield from wrong_clock(alone)
-    for found in stamp_repeated(alone):
-        yield replace(found, severity="error")
+    for finding in find_repeated_stamps(alone):
+        yield replace(finding, severity="error")
     most_s = edge.timing.most_delay_s
-    for found in (*stamps_ahead(alone), *late_stamps(alone)):
+    for finding in (*stamps_ahead(alone), *late_stamps(alone)):
         is_useless = most_s is not None and (most_s <= -_AHEAD_S or most_s >= _KEPT_S)
-        yield replace(found, severity="error") if is_useless else found
+        yield replace(finding, severity="error") if is_useless else finding
 
 
 def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
@@ -534,7 +541,7 @@ def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
 def summary(verdicts: Sequence[Verdict]) -> str:
     """Return one line: how many edges are as expected, and how many are not declared."""
     planned = [verdict for verdict in verdicts if verdict.owner]
-    right = sum(not verdict.found for verdict in planned)
+    right = sum(not verdict.findings for verdict in planned)
     extra = sum(verdict.owner is None for verdict in verdicts)
     more = f", {extra} not declared" if extra else ""
     return f"{right} of {len(planned)} edges as expected{more}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import listed, plural
+from tfcompose.foundation.text import list_names, plural
 from tfcompose.tf.process import ready, say, start, wait_for_go
 
 if TYPE_CHECKING:
@@ -95,8 +95,8 @@ class _Missing:
         names = self._mover.missing
         if names:
             say(
-                f"no joint state after {MISSING_AFTER_S:g} s for {listed(names, _NAMED_AT_MOST)}:"
-                f" {self._senders()}"
+                f"no joint state after {MISSING_AFTER_S:g} s for"
+                f" {list_names(names, _NAMED_AT_MOST)}: {self._senders()}"
             )
 
     def _senders(self) -> str:

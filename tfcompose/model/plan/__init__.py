@@ -53,7 +53,7 @@ from tfcompose.model.plan.plan import (
     StopSignal,
     Sweep,
     UnknownEdges,
-    known_at_launch,
+    is_known_at_launch,
     silent_after_s,
     switch_text,
 )
@@ -105,7 +105,7 @@ __all__ = [
     "StopSignal",
     "Sweep",
     "UnknownEdges",
-    "known_at_launch",
+    "is_known_at_launch",
     "silent_after_s",
     "switch_text",
 ]

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 from msgspec import Meta
 
 from tfcompose.foundation.geometry import Pose
-from tfcompose.model.fields import documented
+from tfcompose.model.fields import documented_field
 
 #: Who moves an edge: nobody, joint states, or its owner.
 EdgeKind = Literal["static", "joint", "dynamic"]
@@ -105,8 +105,8 @@ class EdgePattern:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    parent: str = documented("*", "the parent frame", "camera_color_optical_frame")
-    child: str = documented("*", "the child frame", "tag36h11:*")
+    parent: str = documented_field("*", "the parent frame", "camera_color_optical_frame")
+    child: str = documented_field("*", "the child frame", "tag36h11:*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,7 +352,7 @@ class PlanProcess:
         return MAX_RESTARTS if self.max_restarts is None else self.max_restarts
 
 
-def known_at_launch(value: Any) -> bool:
+def is_known_at_launch(value: Any) -> bool:
     """Return whether a value holds a path that only the launcher knows."""
     if isinstance(value, str):
         return bool(_AT_START.search(value))
@@ -363,39 +363,43 @@ def known_at_launch(value: Any) -> bool:
         if isinstance(value, (list, tuple))
         else ()
     )
-    return any(known_at_launch(item) for item in items)
+    return any(is_known_at_launch(item) for item in items)
 
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
     """ROS settings of all processes."""
 
-    namespace: str = documented(
+    namespace: str = documented_field(
         "", "the namespace of nodes and topics without a leading slash", "robot1"
     )
-    domain_id: int | None = documented(None, "the ROS domain; default: the environment's", 7)
-    discovery: Discovery | None = documented(
+    domain_id: int | None = documented_field(None, "the ROS domain; default: the environment's", 7)
+    discovery: Discovery | None = documented_field(
         None, "the range of discovery; default: the environment's"
     )
-    rmw: Rmw | None = documented(
+    rmw: Rmw | None = documented_field(
         None, "the middleware of all processes; default: the environment's", "zenoh"
     )
-    distro: Distro | None = documented(
+    distro: Distro | None = documented_field(
         None,
         "the ROS release; default: the environment's",
         "kilted",
     )
-    router: str | None = documented(
+    router: str | None = documented_field(
         None,
         "with rmw: zenoh, the router's address for every process; default: port 7447 of its "
         "own computer",
         "tcp/10.0.0.2:7447",
     )
-    clock: Clock = documented("wall", "one clock for the whole plan; sim: the time of /clock")
-    frame_prefix: str = documented(
+    clock: Clock = documented_field(
+        "wall", "one clock for the whole plan; sim: the time of /clock"
+    )
+    frame_prefix: str = documented_field(
         "", "prefix of every frame name, including its slash", "robot1/"
     )
-    shared_frames: tuple[str, ...] = documented((), "frames that never get the prefix", ["map"])
+    shared_frames: tuple[str, ...] = documented_field(
+        (), "frames that never get the prefix", ["map"]
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,19 +423,19 @@ class GuardPolicy:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    mode: GuardMode = documented(
+    mode: GuardMode = documented_field(
         "watch", "strict: also block edges that a process of the plan sends but does not own"
     )
-    unknown_edges: UnknownEdges = documented("warn", "severity of an undeclared edge")
-    on_violation: OnViolation = documented(
+    unknown_edges: UnknownEdges = documented_field("warn", "severity of an undeclared edge")
+    on_violation: OnViolation = documented_field(
         "report",
         "stop-offender: stop the process of the plan that is proven to have caused the error; "
         "stop: stop the robot",
     )
-    allow: tuple[EdgePattern, ...] = documented(
+    allow: tuple[EdgePattern, ...] = documented_field(
         (), "edges that need no declaration", [{"child": "tag36h11:*"}]
     )
-    fence: FenceWay = documented(
+    fence: FenceWay = documented_field(
         "auto",
         "how a strict guard separates processes: by a DDS partition (Fast DDS only), or by "
         "remapping /tf and /tf_static",
@@ -548,7 +552,7 @@ class Plan:
             None,
         )
 
-    def may_be_undeclared(self, parent: str, child: str) -> bool:
+    def allows_undeclared(self, parent: str, child: str) -> bool:
         """Whether nobody needs to have declared the edge.
 
         By policy, or because it is another robot's.
@@ -569,7 +573,7 @@ class Plan:
         """Return the edges that the process publishes, in the plan's order."""
         return tuple(edge for edge in self.edges if edge.owner == owner)
 
-    def started_with(self, process: PlanProcess) -> tuple[Any, ...]:
+    def start_settings(self, process: PlanProcess) -> tuple[Any, ...]:
         """Return all of the plan that decides how the process runs.
 
         An edge's place in the robot file does not, nor the pose of an edge of the stock

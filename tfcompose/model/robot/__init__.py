@@ -49,8 +49,8 @@ from tfcompose.model.robot.robot import (
     Section,
     SourceNumbers,
     Zone,
+    advise_left_out,
     is_optical,
-    left_out_by,
     may_be_refused,
 )
 
@@ -93,9 +93,9 @@ __all__ = [
     "Shutter",
     "SourceNumbers",
     "Zone",
+    "advise_left_out",
     "colour_name",
     "is_optical",
-    "left_out_by",
     "materials",
     "may_be_refused",
     "value_of_word",

@@ -23,7 +23,7 @@ class Asset:
     """
 
     uri: str
-    at: Span | None = None
+    span: Span | None = None
     path: str = ""
     package: str = ""
     inside: str = ""
@@ -36,7 +36,7 @@ class Material:
     name: str
     rgba: tuple[float, float, float, float] | None = None
     texture: Asset | None = None
-    at: Span | None = None
+    span: Span | None = None
 
 
 def colour_name(rgba: Sequence[float]) -> str:
@@ -91,7 +91,7 @@ class Inertial:
     pose: Pose
     tensor: tuple[float, float, float, float, float, float]
     of_shapes: tuple[float, ...] = ()
-    at: Span | None = None
+    span: Span | None = None
     mass_at: Span | None = field(default=None, compare=False)
 
 
@@ -100,7 +100,7 @@ class Link:
     """The body on a frame. ``has_mass``: a mass was given, even without an inertia."""
 
     name: str
-    at: Span
+    span: Span
     visuals: tuple[Shape, ...] = ()
     collisions: tuple[Shape, ...] = ()
     inertial: Inertial | None = None

@@ -14,7 +14,7 @@ from tfcompose.foundation.units import (  # noqa: TC001 (read by them)
     JointVelocity,
     Number,
 )
-from tfcompose.model.fields import documented, narrow
+from tfcompose.model.fields import documented_field, narrow
 from tfcompose.model.plan import PlanEdge, PlanJoint, SourceLine
 
 if TYPE_CHECKING:
@@ -37,12 +37,12 @@ class Limit:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    lower: JointPosition | None = documented(None, "the lowest position")
-    upper: JointPosition | None = documented(None, "the highest position")
-    effort: JointEffort | None = documented(
+    lower: JointPosition | None = documented_field(None, "the lowest position")
+    upper: JointPosition | None = documented_field(None, "the highest position")
+    effort: JointEffort | None = documented_field(
         None, "the largest torque, or force of a prismatic joint"
     )
-    velocity: JointVelocity | None = documented(None, "the largest speed")
+    velocity: JointVelocity | None = documented_field(None, "the largest speed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,8 @@ class Dynamics:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    damping: JointDamping = documented(0.0, "the damping")
-    friction: JointEffort = documented(0.0, "the static friction")
+    damping: JointDamping = documented_field(0.0, "the damping")
+    friction: JointEffort = documented_field(0.0, "the static friction")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,12 +61,12 @@ class SafetyController:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    soft_lower_limit: JointPosition = documented(0.0, "the lower soft limit")
-    soft_upper_limit: JointPosition = documented(0.0, "the upper soft limit")
-    k_position: Number = documented(
+    soft_lower_limit: JointPosition = documented_field(0.0, "the lower soft limit")
+    soft_upper_limit: JointPosition = documented_field(0.0, "the upper soft limit")
+    k_position: Number = documented_field(
         0.0, "the gain from position to velocity inside the soft limits"
     )
-    k_velocity: Number = documented(MISSING, "the gain from velocity to effort", 10)
+    k_velocity: Number = documented_field(MISSING, "the gain from velocity to effort", 10)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +75,12 @@ class ReferencePositions:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    rising: JointPosition | None = documented(None, "the position at which the switch goes on")
-    falling: JointPosition | None = documented(None, "the position at which the switch goes off")
+    rising: JointPosition | None = documented_field(
+        None, "the position at which the switch goes on"
+    )
+    falling: JointPosition | None = documented_field(
+        None, "the position at which the switch goes off"
+    )
 
 
 #: Limits of joints may be rounded by as much: 1.57 rad for 90 deg; rad or m.
@@ -94,7 +98,7 @@ class Joint(PlanJoint):
     follows.
     """
 
-    at: Span = field(kw_only=True)
+    span: Span = field(kw_only=True)
     mimic_at: Span | None = field(default=None, kw_only=True)
     limit: Limit | None = field(default=None, kw_only=True)
     limit_at: Span | None = field(default=None, compare=False, kw_only=True)
@@ -127,16 +131,16 @@ class Calibration:
     """A pose that was measured: that of ``child`` in ``parent``, frames of the robot.
 
     ``nominal`` is the same by the pose that is written beside it, if one is. ``named_at`` is the
-    place in the robot file, ``at`` the entry in the calibration file, ``entry`` its pose as it is
-    there; ``inverted`` says that it was taken the other way round. The limits (m, rad) say how far
-    from nominal is too far.
+    place in the robot file, ``span`` the entry in the calibration file, ``entry`` its pose as it
+    is there; ``inverted`` says that it was taken the other way round. The limits (m, rad) say how
+    far from nominal is too far.
     """
 
     parent: str
     child: str
     pose: Pose
     entry: Pose
-    at: Span
+    span: Span
     format: str
     named_at: Span
     limit_m: float
@@ -148,7 +152,7 @@ class Calibration:
     def name(self) -> str:
         """The measurement, its direction and its source, as people read them."""
         turned = ", inverted" if self.inverted else ""
-        source = f"from {self.at.file}:{self.at.line} ({self.format}{turned})"
+        source = f"from {self.span.file}:{self.span.line} ({self.format}{turned})"
         return f"pose of {self.child} in {self.parent}, {source}"
 
     def off(self, pose: Pose) -> tuple[float, float]:
@@ -170,7 +174,7 @@ _NEARLY = 0.9
 class Edge(PlanEdge):
     """An edge of the plan, with what only the compiler knows of it.
 
-    ``at`` is where it was written, ``source`` the line of that, and ``entry`` the path of the
+    ``span`` is where it was written, ``source`` the line of that, and ``entry`` the path of the
     mapping that gives it: of an edge inside a part it begins with the part's own. ``node`` is
     empty where the owner has one node. ``joint`` moves by joint states. ``free`` is a planar or
     floating joint, of which joint states say nothing. ``other_axes``: the vendor's name for the
@@ -183,7 +187,7 @@ class Edge(PlanEdge):
     rate: float | None = field(default=None, kw_only=True)
     source: SourceLine = field(init=False, compare=False, repr=False)
     joint: Joint | None = field(default=None, kw_only=True)
-    at: Span = field(kw_only=True)
+    span: Span = field(kw_only=True)
     joint_name: str = field(default="", kw_only=True)
     given: bool = field(default=True, kw_only=True)
     entry: tuple[str | int, ...] = field(default=(), compare=False, kw_only=True)
@@ -202,12 +206,12 @@ class Edge(PlanEdge):
     )
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "source", SourceLine(self.at.file, self.at.line))
+        object.__setattr__(self, "source", SourceLine(self.span.file, self.span.line))
 
     def is_slower(self, rate: float) -> bool:
         """Return whether a rate in Hz is below the declared one, as the guard judges it."""
         return self.rate is not None and rate < _NEARLY * self.rate
 
-    def planned(self, **made: Any) -> PlanEdge:
+    def to_plan(self, **made: Any) -> PlanEdge:
         """Return the edge as the plan has it, with fields that follow from the whole robot."""
         return narrow(PlanEdge, self, **made)

@@ -28,7 +28,7 @@ class HardwareComponent:
 
     kind: str
     name: str
-    at: Span
+    span: Span
     command: tuple[Interface, ...] = ()
     state: tuple[Interface, ...] = ()
     params: dict[str, str] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class Hardware:
     name: str
     plugin: str
     type: str
-    at: Span
+    span: Span
     params: dict[str, str] = field(default_factory=dict)
     components: tuple[HardwareComponent, ...] = ()
     rw_rate: int | None = None
@@ -67,7 +67,7 @@ class Block:
     """
 
     name: str
-    at: Span
+    span: Span
     text: str
     places: tuple[Span, ...] = field(default=(), compare=False)
 
@@ -75,18 +75,18 @@ class Block:
         """Return the names of its elements that must be unique in the robot."""
         return _NAMED.findall(self.text)
 
-    def renamed(self, names: Mapping[str, str]) -> Block:
+    def rename(self, names: Mapping[str, str]) -> Block:
         """Return the block with other names.
 
         Of what an attribute or an element holds, if that is a name alone.
         """
 
-        def other(found: re.Match[str]) -> str:
-            before, held = (part for part in found.groups() if part is not None)
+        def other(match: re.Match[str]) -> str:
+            before, held = (part for part in match.groups() if part is not None)
             name = held.strip()
             again = names.get(html.unescape(name))
             return (
-                found[0] if again is None else before + held.replace(name, escape(again, _QUOTES))
+                match[0] if again is None else before + held.replace(name, escape(again, _QUOTES))
             )
 
         return replace(self, text=_HELD.sub(other, self.text))

@@ -44,7 +44,7 @@ class Optics:
     stream: str
     frame: str
     kind: OpticsKind
-    at: Span
+    span: Span
     projection: Projection = "pinhole"
     backward: bool = False
     horizontal: Sector | None = None

@@ -43,7 +43,7 @@ class Node:
     """
 
     name: str
-    at: Span
+    span: Span
     path: tuple[str | int, ...] = ()
     params: dict[str, Any] = field(default_factory=dict)
     lifecycle: LifecycleState | None = None
@@ -112,7 +112,7 @@ class Process(PlanProcess):
     """A process of the plan, with what only the compiler knows of it.
 
     It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the
-    command ``argv``, which for the others holds the arguments, until ``planned`` makes the whole
+    command ``argv``, which for the others holds the arguments, until ``to_plan`` makes the whole
     command of them. ``part`` is the ``Part`` that it belongs to, if any. ``loads`` says that it is
     a container of components, ``describes`` that its parameter ``robot_description`` is the URDF
     for a stock robot_state_publisher. ``rate`` is that of the joint states that it sends.
@@ -123,7 +123,7 @@ class Process(PlanProcess):
 
     nodes: tuple[str, ...] = field(init=False)
     lifecycle: dict[str, LifecycleState] = field(init=False)
-    at: Span = field(kw_only=True)
+    span: Span = field(kw_only=True)
     ros_nodes: tuple[Node, ...] = field(default=(), kw_only=True)
     package: str | None = field(default=None, kw_only=True)
     executable: str | None = field(default=None, kw_only=True)
@@ -141,7 +141,7 @@ class Process(PlanProcess):
         states = {node.name: node.lifecycle for node in self.ros_nodes if node.lifecycle}
         object.__setattr__(self, "lifecycle", states)
 
-    def planned(self, **made: Any) -> PlanProcess:
+    def to_plan(self, **made: Any) -> PlanProcess:
         """Return the process as the plan has it, with fields that follow from the whole robot."""
         return narrow(PlanProcess, self, **made)
 
@@ -187,9 +187,9 @@ class Process(PlanProcess):
 class Host(PlanHost):
     """A computer of the plan, with the place of its name."""
 
-    at: Span = field(kw_only=True, compare=False)
+    span: Span = field(kw_only=True, compare=False)
 
-    def planned(self) -> PlanHost:
+    def to_plan(self) -> PlanHost:
         """Return the computer as the plan has it."""
         return narrow(PlanHost, self)
 
@@ -204,6 +204,6 @@ class Claim(PlanClaim):
     def __post_init__(self) -> None:
         object.__setattr__(self, "switch", switch_text(self.off))
 
-    def planned(self) -> PlanClaim:
+    def to_plan(self) -> PlanClaim:
         """Return the claim as the plan has it."""
         return PlanClaim(self.node, self.parent, self.child, self.switch)

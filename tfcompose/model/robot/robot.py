@@ -49,7 +49,7 @@ class MountedSensor:
     name: str
     preset: str
     kind: str
-    at: Span
+    span: Span
     mount: str
     frames: tuple[str, ...] = ()
     driver_frames: tuple[str, ...] = ()
@@ -73,7 +73,7 @@ class Zone:
     """
 
     name: str
-    at: Span
+    span: Span
     frame: str
     center: Vector
     size: Vector
@@ -86,7 +86,7 @@ class SourceNumbers:
     """The numbers of a pose or limit as in the source file, in SI, with their places.
 
     ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each
-    number whether it stands there with a unit, and ``place`` where the number of an index stands.
+    number whether it stands there with a unit, and ``locate`` where the number of an index stands.
     ``in_part`` is the entry's name in the whole robot where the file is that of a part. ``steps``
     are the keys or indices of the numbers, as far as they are known.
     """
@@ -94,7 +94,7 @@ class SourceNumbers:
     path: tuple[str | int, ...]
     numbers: tuple[float, ...]
     with_unit: tuple[bool, ...]
-    place: Callable[[int], Span] = field(compare=False, repr=False)
+    locate: Callable[[int], Span] = field(compare=False, repr=False)
     in_part: str = ""
     steps: tuple[str | int, ...] = ()
 
@@ -124,12 +124,12 @@ class Section:
 
     name: str
     value: Any
-    place: Callable[[tuple[str | int, ...]], Span] = field(compare=False, repr=False)
+    locate: Callable[[tuple[str | int, ...]], Span] = field(compare=False, repr=False)
     planned: Any = None
 
-    def at(self, *path: str | int) -> Span:
+    def span_of(self, *path: str | int) -> Span:
         """Return the place of a value in the section, or of the nearest around it."""
-        return self.place((self.name, *path))
+        return self.locate((self.name, *path))
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,14 +154,14 @@ def may_be_refused(name: str, broken: frozenset[tuple[str, str]], known: Iterabl
     if ("parts", "") in broken:
         known = tuple(known)
         return name in known or slip_of(name, known) is None
-    names, beginnings = _brought(broken)
+    names, beginnings = _names_refused_entries(broken)
     return name in names or name.startswith(beginnings)
 
 
-def left_out_by(conditions: Mapping[tuple[str, str], str], name: str) -> str:
+def advise_left_out(conditions: Mapping[tuple[str, str], str], name: str) -> str:
     """Return advice about a name whose entry a condition removes; empty otherwise."""
     for entry, condition in conditions.items():
-        names, beginnings = _brought(frozenset({entry}))
+        names, beginnings = _names_refused_entries(frozenset({entry}))
         if name in names or name.startswith(beginnings):
             return (
                 f"{entry[1]} is left out by its when: {condition}; give this entry the same when"
@@ -170,7 +170,9 @@ def left_out_by(conditions: Mapping[tuple[str, str], str], name: str) -> str:
 
 
 @lru_cache(maxsize=8)  # a robot's names are looked up in the same entries
-def _brought(broken: frozenset[tuple[str, str]]) -> tuple[frozenset[str], tuple[str, ...]]:
+def _names_refused_entries(
+    broken: frozenset[tuple[str, str]],
+) -> tuple[frozenset[str], tuple[str, ...]]:
     """Return the names that refused entries would have brought, and prefixes of more."""
     beginnings = [f"{entry}_" for section, entry in broken if section == "sensors"]
     beginnings += [entry for section, entry in broken if section == "parts"]
@@ -247,7 +249,7 @@ class Robot:
         )
         return replace(
             self,
-            frames={final(frame): at for frame, at in self.frames.items()},
+            frames={final(frame): span for frame, span in self.frames.items()},
             edges=tuple(
                 replace(
                     edge,
@@ -271,12 +273,12 @@ class Robot:
             name, self.broken, chain(self.frames, (process.name for process in self.processes))
         )
 
-    def is_foreign(self, at: Span | None) -> bool:
+    def is_foreign(self, span: Span | None) -> bool:
         """Return whether the place is in a URDF, or what xacro made.
 
         Advice speaks of XML there.
         """
-        return at is not None and at.file in self.foreign
+        return span is not None and span.file in self.foreign
 
     def parent_edge(self, child: str) -> Edge | None:
         """Return the first edge whose child is the frame, or None for a root."""
@@ -294,7 +296,7 @@ class Robot:
             table.setdefault(edge.parent, []).append(edge)
         return table
 
-    def described(self) -> set[str]:
+    def described_frames(self) -> set[str]:
         """Return the frames that a URDF can hold.
 
         The base, and what is below it over edges of known pose.

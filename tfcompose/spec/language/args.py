@@ -13,9 +13,9 @@ from tfcompose.foundation.units import (
     Quantity,
     Truth,
     UnitError,
+    format_value,
     invalid,
     quantity,
-    shown,
     with_article,
 )
 from tfcompose.spec.language.expressions import IDENTIFIER, Value, insertable_text
@@ -42,7 +42,7 @@ class GivenArg:
     """
 
     value: Any
-    at: Span
+    span: Span
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class ArgError(ValueError):
 def _scalar(value: Any) -> Any:
     value = plain(value)
     if isinstance(value, (dict, list)):
-        raise invalid("TF103", f"{shown(value)} is not a string, number, true or false")
+        raise invalid("TF103", f"{format_value(value)} is not a string, number, true or false")
     return value
 
 
@@ -141,7 +141,7 @@ class ArgSpec(Checked):
         if self.kind == "int" and (self.min is not None or self.max is not None):
             try:
                 known = {
-                    insertable_text(self.typed(value)): None
+                    insertable_text(self.convert(value)): None
                     for value in (self.min, self.default, self.max)
                     if value is not None
                 }
@@ -172,7 +172,7 @@ class ArgSpec(Checked):
         ):
             try:
                 if value is not None:
-                    spec.typed(value)
+                    spec.convert(value)
             except ArgError as error:
                 yield path, invalid(error.code, str(error), error.advice)
                 return
@@ -188,24 +188,26 @@ class ArgSpec(Checked):
         Raises:
             ArgError: if the argument cannot have it.
         """
-        value = self.typed(given)
+        value = self.convert(given)
         if self.choices:
-            choices = [self.typed(choice) for choice in self.choices]
+            choices = [self.convert(choice) for choice in self.choices]
             if value not in choices:
                 texts = [as_given(choice) for choice in self.choices]
                 raise ArgError(
                     "TF106",
-                    f"{shown(given)} is not one of the choices",
+                    f"{format_value(given)} is not one of the choices",
                     _one_of(insertable_text(value), texts),
                 )
         for bound, sign, what in ((self.min, 1, "less"), (self.max, -1, "greater")):
-            limit = self.typed(bound) if bound is not None else None
+            limit = self.convert(bound) if bound is not None else None
             if (
                 isinstance(limit, Quantity)
                 and isinstance(value, Quantity)
                 and sign * (value.value - limit.value) < 0
             ):
-                raise ArgError("TF106", f"{shown(given)} is {what} than {bound}", self._range())
+                raise ArgError(
+                    "TF106", f"{format_value(given)} is {what} than {bound}", self._range()
+                )
         return value
 
     def _range(self) -> str:
@@ -215,7 +217,7 @@ class ArgSpec(Checked):
         ]
         return ", ".join(filter(None, bounds))
 
-    def typed(self, given: Any) -> Value:
+    def convert(self, given: Any) -> Value:
         """Return the value as one of the argument's type.
 
         Raises:
@@ -244,7 +246,7 @@ class ArgSpec(Checked):
                 Quantity(float(number.value)) if number.dimension == NUMBER else number
             )  # a node's double
         advice = {"bool": "true or false", "string": "put it in quotes"}.get(kind, "")
-        raise ArgError("TF103", f"{shown(given)} is not {_CALLED[kind]}", advice)
+        raise ArgError("TF103", f"{format_value(given)} is not {_CALLED[kind]}", advice)
 
     def _refuse_dimension(self, number: Quantity, given: Any) -> None:
         known = (self.default, *self.choices, self.min, self.max)
@@ -257,7 +259,8 @@ class ArgSpec(Checked):
         if number.dimension not in {NUMBER, other}:
             raise ArgError(
                 "TF104",
-                f"{shown(given)} is {with_article(number.dimension)}, not {with_article(other)}",
+                f"{format_value(given)} is {with_article(number.dimension)},"
+                f" not {with_article(other)}",
             )
 
 
@@ -292,7 +295,7 @@ def _read(text: str) -> Any:
 
 def as_given(value: Any) -> str:
     """Return a value as the command line gives it."""
-    return shown(value) if isinstance(value, bool) else str(value)
+    return format_value(value) if isinstance(value, bool) else str(value)
 
 
 def _is_name(name: str) -> str:

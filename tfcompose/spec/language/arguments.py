@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from tfcompose.spec.language.args import ArgSpec, Given, full
 from tfcompose.spec.language.expressions import Value, constant, evaluate, insertable_text, parse
-from tfcompose.spec.language.variables import Variables, unused
+from tfcompose.spec.language.variables import Variables, unused_variables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -79,7 +79,7 @@ def alternatives_of(
     """
     idle = {
         name
-        for section, name in unused(source.data, aside.data.get("profiles"))
+        for section, name in unused_variables(source.data, aside.data.get("profiles"))
         if section == "args"
     }
     variables = Variables(source, given)

@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 from tfcompose.foundation.units import Density, Inertia, Mass, Size, invalid
 from tfcompose.spec.language.pose import MountKeys, Posed, Rotated
 from tfcompose.spec.language.spec import Spec, key
-from tfcompose.spec.language.values import Colour, Name, Scale, Sizes, Text, Xyz, listed, short
+from tfcompose.spec.language.values import Colour, Name, Scale, Sizes, Text, Xyz, as_list, short
 from tfcompose.spec.load import Path
 
 
@@ -155,7 +155,7 @@ class InertialSpec(Rotated):
 
 #: A list of shapes, or one shape for a list of one.
 Shapes = Annotated[
-    tuple[ShapeSpec, ...], BeforeValidator(listed, ShapeSpec | tuple[ShapeSpec, ...])
+    tuple[ShapeSpec, ...], BeforeValidator(as_list, ShapeSpec | tuple[ShapeSpec, ...])
 ]
 Collision = Annotated[
     Annotated[Literal["same"], Tag("[same]")] | Annotated[Shapes, Tag("[shapes]")],

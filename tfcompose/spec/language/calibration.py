@@ -32,7 +32,7 @@ from tfcompose.foundation.geometry import (
     quat_from_matrix,
     quat_from_rpy,
 )
-from tfcompose.foundation.units import Number, invalid, shown
+from tfcompose.foundation.units import Number, format_value, invalid
 from tfcompose.spec.language.pose import CalibrationFormat, has_unit_length, is_rotation
 from tfcompose.spec.language.reading import SpecRefusal, read
 from tfcompose.spec.language.spec import Spec
@@ -58,16 +58,16 @@ def _is_no_expression(value: Any) -> Any:
     if isinstance(value, str) and ("${" in value or "(" in value):
         advice = "write the number; an angle in degrees: !degrees 15"
         raise invalid(
-            "TF103", f"{shown(value)} is an expression, which is not computed here", advice
+            "TF103", f"{format_value(value)} is an expression, which is not computed here", advice
         )
     if isinstance(value, str) and len(value) > _LONGEST_NUMBER:
-        raise invalid("TF103", f"{shown(value)} is not a number")
+        raise invalid("TF103", f"{format_value(value)} is not a number")
     return value
 
 
 def _frame(name: str) -> str:
     if not name.strip("/"):
-        raise invalid("TF103", f"{shown(name)} is not a frame's name")
+        raise invalid("TF103", f"{format_value(name)} is not a frame's name")
     return name.lstrip("/")
 
 
@@ -257,7 +257,7 @@ class CalibrationEntry:
     """
 
     pose: Pose
-    at: Span
+    span: Span
     parent: str | None = None
     child: str | None = None
     what: str = ""
@@ -272,50 +272,50 @@ class CalibrationEntry:
 class CalibrationFile:
     """What a calibration file says.
 
-    ``found`` holds what is wrong with it, at the place that names it.
+    ``findings`` holds what is wrong with it, at the place that names it.
     """
 
     file: str
     format: str
     entries: tuple[CalibrationEntry, ...]
-    found: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
 
 
-def unreadable(file: str, form: str, at: Span, found: Iterable[Finding]) -> CalibrationFile:
+def unreadable(file: str, form: str, span: Span, findings: Iterable[Finding]) -> CalibrationFile:
     """Return what a file says that cannot be read: nothing, and why."""
     return CalibrationFile(
-        file, form, (), tuple(_inside("TF610", finding, file, at) for finding in found)
+        file, form, (), tuple(_inside("TF610", finding, file, span) for finding in findings)
     )
 
 
-def _inside(code: str, found: Finding, file: str, at: Span) -> Finding:
+def _inside(code: str, found: Finding, file: str, span: Span) -> Finding:
     """Return a finding inside a calibration file as one at the place that names the file."""
     is_exact = found.span is not None and found.span != Span(file)
     notes = [Note("here", found.span), *found.notes] if is_exact else found.notes
-    return finding(code, f"{file}: {found.message}", at, help=found.help, notes=notes)
+    return finding(code, f"{file}: {found.message}", span, help=found.help, notes=notes)
 
 
-def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFile:
+def read_calibration(text: str, file: str, form: str, span: Span) -> CalibrationFile:
     """Return what the text says, read in the format, which ``auto`` recognises.
 
-    ``at`` is where the file is named.
+    ``span`` is where the file is named.
     """
     try:
         kind, documents = load_calibration(text, file)
     except RejectedError as error:
-        return unreadable(file, form, at, _without_text(error.findings, text))
-    wrong = [finding for document in documents for finding in document.found]
+        return unreadable(file, form, span, _without_text(error.findings, text))
+    wrong = [finding for document in documents for finding in document.findings]
     if wrong:
         wrong = _without_text(wrong, text)
         return CalibrationFile(
-            file, form, (), tuple(_inside("TF610", refusal, file, at) for refusal in wrong)
+            file, form, (), tuple(_inside("TF610", refusal, file, span) for refusal in wrong)
         )
     known = _recognise(kind, documents)
     chosen = known if form == "auto" else form
     if chosen is None or not documents:
         what = "is empty" if not documents else "is in no known format"
         advice = f"formats: {', '.join(FORMATS)}; tfcompose help calibration shows them"
-        return CalibrationFile(file, form, (), (_of_no_format(file, what, at, advice),))
+        return CalibrationFile(file, form, (), (_of_no_format(file, what, span, advice),))
     if chosen != known and (kind != "yaml" or chosen == "moveit"):
         advice = (
             f"leave format out; it reads like {known}"
@@ -323,15 +323,15 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
             else f"formats: {', '.join(FORMATS)}"
         )
         return CalibrationFile(
-            file, chosen, (), (_of_no_format(file, f"is not a {chosen} file", at, advice),)
+            file, chosen, (), (_of_no_format(file, f"is not a {chosen} file", span, advice),)
         )
-    reader = _FormatReader(at)
+    reader = _FormatReader(span)
     for document in documents:
         reader.source = document
         reader.entries += _READERS[chosen](reader, document.data)
-    if not reader.entries and not reader.found:
-        reader.found.append(_of_no_format(file, f"holds no pose, read as {chosen}", at))
-    return CalibrationFile(file, chosen, tuple(reader.entries), tuple(reader.found))
+    if not reader.entries and not reader.findings:
+        reader.findings.append(_of_no_format(file, f"holds no pose, read as {chosen}", span))
+    return CalibrationFile(file, chosen, tuple(reader.entries), tuple(reader.findings))
 
 
 #: What calibration files say, and passwords do not.
@@ -343,13 +343,13 @@ _TYPICAL = re.compile(
 
 def _without_text(findings: Sequence[Finding], text: str) -> list[Finding]:
     """Return the findings about a text; of one that may be anything, they repeat nothing."""
-    if _TYPICAL.search(text) or any(found.code in {"TF001", "TF008"} for found in findings):
+    if _TYPICAL.search(text) or any(finding.code in {"TF001", "TF008"} for finding in findings):
         return list(findings)
     return [replace(findings[0], message="it cannot be read as a calibration", help="")]
 
 
-def _of_no_format(file: str, what: str, at: Span, advice: str = "") -> Finding:
-    return finding("TF611", f"{file} {what}", at, help=advice, notes=[Note("here", Span(file))])
+def _of_no_format(file: str, what: str, span: Span, advice: str = "") -> Finding:
+    return finding("TF611", f"{file} {what}", span, help=advice, notes=[Note("here", Span(file))])
 
 
 _AUTOWARE_KEYS = frozenset(PoseXyzRpy.model_fields)
@@ -389,7 +389,7 @@ class _FormatReader:
     named_at: Span
     source: Source = field(init=False)
     entries: list[CalibrationEntry] = field(default_factory=list)
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
     def model(self, model: type[M], data: Any, path: Path) -> M | None:
         """Return what is at a path as the model, or None after noting what is wrong with it."""
@@ -409,7 +409,7 @@ class _FormatReader:
 
     def _refuse(self, refusal: SpecRefusal) -> None:
         code = "TF614" if refusal.code in _NO_ROTATION else "TF610"
-        self.found.append(
+        self.findings.append(
             _inside(code, refusal.finding(self.source), self.source.file, self.named_at)
         )
 
@@ -422,7 +422,9 @@ class _FormatReader:
         what: str = "",
     ) -> CalibrationEntry:
         """Return the entry at a path."""
-        span = self.source.at_key(path) if self.source.has_key(path) else self.source.at(path)
+        span = (
+            self.source.key_span(path) if self.source.has_key(path) else self.source.span_of(path)
+        )
         return CalibrationEntry(pose, span, parent, child, what)
 
     def autoware(self, data: Any) -> Iterator[CalibrationEntry]:
@@ -437,8 +439,8 @@ class _FormatReader:
 
     def easy_handeye2(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield the one entry of a hand-eye calibration."""
-        at: Path = ("parameters",) if isinstance(data, dict) and "parameters" in data else ()
-        names = self._handeye_names(data["parameters"] if at else data, at)
+        path: Path = ("parameters",) if isinstance(data, dict) and "parameters" in data else ()
+        names = self._handeye_names(data["parameters"] if path else data, path)
         if names is None:
             return
         if "transformation" in data:
@@ -469,7 +471,7 @@ class _FormatReader:
         is_list = isinstance(data, dict) and "transforms" in data
         messages = data["transforms"] if is_list else [data]
         if not isinstance(messages, list):
-            self.refuse(("transforms",), f"{shown(messages)} is not a list of transforms")
+            self.refuse(("transforms",), f"{format_value(messages)} is not a list of transforms")
             return
         for index, message in enumerate(messages):
             path: Path = ("transforms", index) if is_list else ()

@@ -13,7 +13,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, finding
-from tfcompose.foundation.units import Quantity, shown
+from tfcompose.foundation.units import Quantity, format_value
 from tfcompose.spec.language.expressions import (
     IDENTIFIER,
     MOST_ITEMS,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from tfcompose.spec.language.expressions import Value
-    from tfcompose.spec.load import Path, Place, Source
+    from tfcompose.spec.load import Location, Path, Source
 
 #: The sections whose entries may have ``when`` and ``for``.
 SECTIONS = (
@@ -53,21 +53,21 @@ class Unfolded:
 
     ``scopes`` are the values of their loops, by (section, name).
 
-    ``found`` is what is wrong with conditions and loops, and ``refused`` are their paths.
+    ``findings`` is what is wrong with conditions and loops, and ``refused`` are their paths.
     ``conditions`` are those of the entries that they leave out, as they are written, by (section,
     name).
     """
 
     source: Source
     scopes: dict[Path, Mapping[str, Value]] = field(default_factory=dict)
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     refused: list[Path] = field(default_factory=list)
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
 
 
 def unfold(source: Source, variables: Variables) -> Unfolded:
     """Return the source without entries whose conditions fail, loops unrolled."""
-    return _Unfolding(source, variables).unfolded()
+    return _Unfolding(source, variables).unfold()
 
 
 def holds(condition: Any, variables: Variables) -> bool:
@@ -93,7 +93,11 @@ def _decide(condition: Any, variables: Variables, scope: Scope) -> bool:
         if is_bare
         else "for example when: ${args.sim}, or ${args.cameras > 1}"
     )
-    shown_value = shown(condition) if isinstance(condition, (str, dict, list)) else shown(value)
+    shown_value = (
+        format_value(condition)
+        if isinstance(condition, (str, dict, list))
+        else format_value(value)
+    )
     raise ExpressionError(f"when takes true or false, and {shown_value} is neither", advice)
 
 
@@ -105,7 +109,7 @@ class _Unfolding:
         self.replaced = dict(source.replaced)
         self.gone: list[re.Pattern[str]] = []
 
-    def unfolded(self) -> Unfolded:
+    def unfold(self) -> Unfolded:
         data, inside, is_changed = dict(self.source.data), dict(self.source.places.inside), False
         for section in SECTIONS:
             entries = data.get(section)
@@ -125,42 +129,42 @@ class _Unfolding:
         return self.done
 
     def _section(
-        self, section: str, entries: dict[str, Any], place: Place
-    ) -> tuple[dict[str, Any], Place]:
+        self, section: str, entries: dict[str, Any], location: Location
+    ) -> tuple[dict[str, Any], Location]:
         data: dict[str, Any] = {}
-        inside: dict[Any, Place] = {}
-        keys: dict[Any, Place] = {}
+        inside: dict[Any, Location] = {}
+        keys: dict[Any, Location] = {}
         for template, entry in entries.items():
-            at: Path = (section, template)
+            path: Path = (section, template)
             is_plain = not isinstance(entry, dict) or _KEYS.isdisjoint(entry)
             made = (
-                [(template, entry, place.inside[template])]
+                [(template, entry, location.inside[template])]
                 if is_plain
-                else list(self._make_entries(at, entry))
+                else list(self._make_entries(path, entry))
             )
             for name, content, where in made:
                 if name in data:
                     message = f"{template} and another entry are both {name}"
                     self._refuse(
-                        at, ExpressionError(message, "give them other names"), on_key=True
+                        path, ExpressionError(message, "give them other names"), on_key=True
                     )
                     continue
-                data[name], inside[name], keys[name] = content, where, place.keys[template]
-        return data, place.with_inside(inside, keys)
+                data[name], inside[name], keys[name] = content, where, location.keys[template]
+        return data, location.with_inside(inside, keys)
 
     def _make_entries(
-        self, at: Path, entry: dict[str, Any]
-    ) -> Iterator[tuple[str, dict[str, Any], Place]]:
+        self, path: Path, entry: dict[str, Any]
+    ) -> Iterator[tuple[str, dict[str, Any], Location]]:
         """Yield the names, the data and the places of what an entry stands for."""
-        section, template = str(at[0]), str(at[1])
-        place = self.source.places.nearest(at)
+        section, template = str(path[0]), str(path[1])
+        location = self.source.places.nearest(path)
         decided = {
             key for key in _KEYS if entry.get(key) is not None
         }  # one without a value is refused later
         try:
             scopes = self._scopes(entry["for"], template) if "for" in decided else [{}]
         except ExpressionError as error:
-            self._refuse((*at, "for"), error)
+            self._refuse((*path, "for"), error)
             return
         self.gone.append(
             re.compile(
@@ -176,26 +180,28 @@ class _Unfolding:
                     else template
                 )
             except ExpressionError as error:
-                self._refuse(at, error, on_key=True)
+                self._refuse(path, error, on_key=True)
                 continue
             try:
                 if "when" in decided and not _decide(entry["when"], self.variables, scope):
                     self.done.conditions[section, name] = (
-                        entry["when"] if isinstance(entry["when"], str) else shown(entry["when"])
+                        entry["when"]
+                        if isinstance(entry["when"], str)
+                        else format_value(entry["when"])
                     )
                     continue
             except ExpressionError as error:  # with the entry there, nothing else is missing
-                self._refuse((*at, "when"), error)
+                self._refuse((*path, "when"), error)
             inner = {key: value for key, value in entry.items() if key not in decided}
-            where = place.with_inside(
-                {key: below for key, below in place.inside.items() if key not in decided},
-                {key: below for key, below in place.keys.items() if key not in decided},
+            where = location.with_inside(
+                {key: below for key, below in location.inside.items() if key not in decided},
+                {key: below for key, below in location.keys.items() if key not in decided},
             )
             if scope:
                 self.done.scopes[section, name] = scope
                 inner, where = self._fill_keys(inner, where, scope)
                 for old, spans in self.source.replaced.items():
-                    if old[:2] == at:
+                    if old[:2] == path:
                         self.replaced[(section, name) + old[2:]] = spans  # noqa: RUF005 (Python 3.10 cannot)
             yield name, inner, where
 
@@ -207,7 +213,8 @@ class _Unfolding:
         """
         if not isinstance(loops, dict) or not loops:
             raise ExpressionError(
-                f"for is {shown(loops)}", 'for: {i: "${range(3)}"}, or for: {side: [left, right]}'
+                f"for is {format_value(loops)}",
+                'for: {i: "${range(3)}"}, or for: {side: [left, right]}',
             )
         for name in loops:
             if name in self.variables.given or name in RESERVED or not IDENTIFIER.fullmatch(name):
@@ -237,14 +244,14 @@ class _Unfolding:
             return items(value, self.variables.lookup)
         if not isinstance(value, list):
             raise ExpressionError(
-                f"{shown(value)} is not a list of items",
+                f"{format_value(value)} is not a list of items",
                 "a list, or ${range(3)}, or ${range(1, 4)}",
             )
         found: list[Value] = []
         for element in value:
             if isinstance(element, (dict, list)) or element is None:
                 raise ExpressionError(
-                    f"{shown(element)} cannot be an item of a loop", "a string, or a number"
+                    f"{format_value(element)} cannot be an item of a loop", "a string, or a number"
                 )
             item = self.variables.value_in(element, {}) if isinstance(element, str) else element
             found.append(
@@ -254,30 +261,32 @@ class _Unfolding:
             )
         return found
 
-    def _fill_keys(self, value: Any, place: Place, scope: Scope) -> tuple[Any, Place]:
+    def _fill_keys(self, value: Any, location: Location, scope: Scope) -> tuple[Any, Location]:
         """Return the mapping with the loops' variables in the names of keys filled in."""
         if not isinstance(value, dict):
-            return value, place
+            return value, location
         data: dict[str, Any] = {}
-        inside: dict[Any, Place] = {}
-        keys: dict[Any, Place] = {}
+        inside: dict[Any, Location] = {}
+        keys: dict[Any, Location] = {}
         for key, item in value.items():
             name = key
             if "${" in key:
                 try:
                     name = insertable_text(self.variables.value_in(key, scope))
                 except ExpressionError as error:
-                    at = place.keys[key].span
-                    self.done.found.append(finding("TF105", str(error), at, help=error.advice))
-            data[name], inside[name] = self._fill_keys(item, place.inside[key], scope)
-            keys[name] = place.keys[key]
-        return data, place.with_inside(inside, keys)
+                    span = location.keys[key].span
+                    self.done.findings.append(
+                        finding("TF105", str(error), span, help=error.advice)
+                    )
+            data[name], inside[name] = self._fill_keys(item, location.inside[key], scope)
+            keys[name] = location.keys[key]
+        return data, location.with_inside(inside, keys)
 
     def _refuse(self, path: Path, error: ExpressionError, *, on_key: bool = False) -> None:
         self.done.refused.append(path)
         if not isinstance(error, NothingNewError):
             refusal = SpecRefusal("TF105", path, str(error), error.advice, on_key)
-            self.done.found.append(refusal.finding(self.source))
+            self.done.findings.append(refusal.finding(self.source))
 
     def _drop_waits(self, data: dict[str, Any]) -> None:
         """Let nothing wait for what is not there only because of its condition or its loop."""

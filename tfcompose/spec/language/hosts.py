@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, Strict
 
-from tfcompose.foundation.units import invalid, shown
+from tfcompose.foundation.units import format_value, invalid
 from tfcompose.spec.language.spec import Entry, key
 from tfcompose.spec.language.values import Integral, Matches, OneOrMore, Text
 
@@ -15,8 +15,10 @@ _WITH_PORT = re.compile(r"((?:[^@:]+@)?[^@:]+):([0-9]+)")
 
 
 def _without_port(value: str) -> str:
-    if found := _WITH_PORT.fullmatch(value):
-        raise invalid("TF106", f"{shown(value)} has a port", f"ssh: {found[1]}, port: {found[2]}")
+    if match := _WITH_PORT.fullmatch(value):
+        raise invalid(
+            "TF106", f"{format_value(value)} has a port", f"ssh: {match[1]}, port: {match[2]}"
+        )
     return value
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic.json_schema import GenerateJsonSchema
 
 from tfcompose.foundation.catalogue import CATALOGUE
-from tfcompose.foundation.tool import installed, load
+from tfcompose.foundation.tool import installed_tools, load
 from tfcompose.foundation.units import EXPRESSION
 from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.preset import PresetSpec
@@ -37,7 +37,9 @@ def model_of(language: str) -> type[Spec]:
     """Return the model of ``robot``, ``preset``, ``node`` or a tool's language."""
     if language == "robot":
         return full_robot_model()
-    model: type[Spec] = _MODELS.get(language) or load(installed().languages()[language].model)
+    model: type[Spec] = _MODELS.get(language) or load(
+        installed_tools().languages()[language].model
+    )
     return model
 
 
@@ -106,18 +108,18 @@ def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict
         if name not in names
     }
 
-    def inlined(value: Any) -> Any:
+    def inline(value: Any) -> Any:
         if isinstance(value, list):
-            return [inlined(item) for item in value]
+            return [inline(item) for item in value]
         if not isinstance(value, dict):
             return value
-        other = {key: inlined(item) for key, item in value.items()}
+        other = {key: inline(item) for key, item in value.items()}
         if value.get("$ref") not in types:
             return other
-        return dict(sorted((inlined(types[other.pop("$ref")]) | other).items()))
+        return dict(sorted((inline(types[other.pop("$ref")]) | other).items()))
 
     inside = {name: definition for name, definition in schema["$defs"].items() if name in names}
-    made: dict[str, Any] = inlined(schema | {"$defs": inside})
+    made: dict[str, Any] = inline(schema | {"$defs": inside})
     return made
 
 
@@ -291,20 +293,20 @@ def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> 
 def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict[str, Any]:
     """Return the schema of a mapping that is merged over one at a pointer."""
 
-    def merged(value: Any) -> Any:
+    def merge(value: Any) -> Any:
         if isinstance(value, list):
-            return [merged(item) for item in value]
+            return [merge(item) for item in value]
         if not isinstance(value, dict):
             return value
         if value.get("$ref") in mappings:
             return value | {"$ref": f"{value['$ref']}Overlay"}
         result = {}
         for key, item in value.items():
-            result[key] = item if key in {"items", "default", "examples"} else merged(item)
+            result[key] = item if key in {"items", "default", "examples"} else merge(item)
         return result
 
     def optional(name: str, value: dict[str, Any]) -> dict[str, Any]:
-        again = merged(value)
+        again = merge(value)
         form = {"$ref": f"{at}/properties/{name}"} if again == value else again
         return _removable({"description": value["description"]} | form)
 

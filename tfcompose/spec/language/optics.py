@@ -15,8 +15,8 @@ from tfcompose.foundation.units import (
     Measure,
     Rate,
     Size,
+    format_value,
     invalid,
-    shown,
 )
 from tfcompose.model.robot import OpticsKind, Projection, Shutter
 from tfcompose.spec.language.spec import Checked, Spec, key
@@ -33,7 +33,7 @@ def _about_zero(value: Any) -> Any:
     angle = _ANGLE.read(value)
     if angle < 0:
         raise invalid(
-            "TF106", f"{shown(value)} is less than 0", "give the whole angle, or [from, to]"
+            "TF106", f"{format_value(value)} is less than 0", "give the whole angle, or [from, to]"
         )
     return [-angle / 2, angle / 2]
 

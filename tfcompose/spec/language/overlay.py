@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.spec.language.args import Given
 from tfcompose.spec.language.conditions import holds
 from tfcompose.spec.language.expressions import ExpressionError
@@ -24,7 +24,7 @@ from tfcompose.spec.language.recognition import load_named
 from tfcompose.spec.language.spec import Spec, mappings_at
 from tfcompose.spec.language.tool_keys import robot_model
 from tfcompose.spec.language.variables import NothingNewError, Variables
-from tfcompose.spec.load import DEEPEST, Path, Place, Source, Spans, load, path_named
+from tfcompose.spec.load import DEEPEST, Location, Path, Source, Spans, find_path, load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -65,14 +65,14 @@ def compose(
     unusable = [name for name in profiles if not isinstance(known.get(name), dict)]
     if unusable:
         unknown = (_unknown_profile(source, name, read) for name in missing)
-        raise RejectedError([*source.found, *wrong, *unknown])
-    base = replace(without(source, "profiles"), found=(*source.found, *wrong))
+        raise RejectedError([*source.findings, *wrong, *unknown])
+    base = replace(without(source, "profiles"), findings=(*source.findings, *wrong))
     result = _lay_over_all(base, source, profiles, overlays)
     if any(isinstance(profile, dict) and "when" in profile for profile in known.values()):
         holding, refused = _holding(source, result, given)
         profiles = [*(name for name in holding if name not in profiles), *profiles]
         result = _lay_over_all(
-            replace(base, found=(*base.found, *refused)), source, profiles, overlays
+            replace(base, findings=(*base.findings, *refused)), source, profiles, overlays
         )
     return replace(result, is_variant=bool(profiles or overlays))
 
@@ -93,15 +93,17 @@ def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], l
     """Return the profiles whose conditions hold, and what is wrong with conditions."""
     variables = Variables(others, given)
     names: list[str] = []
-    found = []
+    findings = []
     for name, profile in profiles_in(source).items():
-        at: Path = ("profiles", name)
+        path: Path = ("profiles", name)
         if "when" not in profile:
             continue
         if "args" in profile:
             advice = "a profile that is named with --profile may"
             message = "a profile with a condition cannot change args, which decide it"
-            found.append(finding("TF107", message, source.at_key((*at, "args")), help=advice))
+            findings.append(
+                finding("TF107", message, source.key_span((*path, "args")), help=advice)
+            )
             continue
         try:
             if holds(profile["when"], variables):
@@ -109,8 +111,10 @@ def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], l
         except NothingNewError:
             continue
         except ExpressionError as error:
-            found.append(finding("TF105", str(error), source.at((*at, "when")), help=error.advice))
-    return names, found
+            findings.append(
+                finding("TF105", str(error), source.span_of((*path, "when")), help=error.advice)
+            )
+    return names, findings
 
 
 def lay_over(
@@ -128,15 +132,15 @@ def lay_over(
         of = robot_model(base.data.keys() | overlay.data.keys())
     merger = _Merger(base.replaced, overlay.replaced, of, is_overlay=is_overlay)
     if is_overlay and not overlay.data:
-        merger.found.append(_idle("nothing is merged over the robot here", overlay.places))
+        merger.findings.append(_idle("nothing is merged over the robot here", overlay.places))
     data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
-    found = (*base.found, *overlay.found, *merger.found)
+    findings = (*base.findings, *overlay.findings, *merger.findings)
     allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
     return replace(
         base,
         data=data,
         places=places,
-        found=found,
+        findings=findings,
         allows=allows,
         replaced=merger.replaced,
         has_nulls=base.has_nulls or overlay.has_nulls,
@@ -154,14 +158,14 @@ def _with_full_args(source: Source) -> Source:
         for declared_value in declared.values()
     ):
         return source
-    place = source.places.inside["args"]
-    inside, keys, data = dict(place.inside), dict(place.keys), dict(declared)
+    location = source.places.inside["args"]
+    inside, keys, data = dict(location.inside), dict(location.keys), dict(declared)
     for name, value in declared.items():
         if not isinstance(value, dict) and value is not None:
             data[name] = {"default": value}
-            at = place.inside[name]
-            inside[name] = Place(at.span, {"default": at}, {"default": at})
-    places = {**source.places.inside, "args": place.with_inside(inside, keys)}
+            at = location.inside[name]
+            inside[name] = Location(at.span, {"default": at}, {"default": at})
+    places = {**source.places.inside, "args": location.with_inside(inside, keys)}
     return replace(
         source,
         data=source.data | {"args": data},
@@ -172,7 +176,7 @@ def _with_full_args(source: Source) -> Source:
 Replaced = dict[Path, tuple["Span", ...]]
 """Where values stood that others were laid over, the last one first."""
 
-Part = tuple[dict[str, Any], Place]
+Part = tuple[dict[str, Any], Location]
 """A mapping, and where it and what is in it stands."""
 
 
@@ -190,7 +194,7 @@ class _Merger:
         self.below = below
         self.above = above
         self.replaced = below | above
-        self.found: list[Finding] = []
+        self.findings: list[Finding] = []
 
     def merge(self, base: Part, overlay: Part, path: Path) -> Part:
         """Return ``base`` with ``overlay`` laid over it."""
@@ -203,7 +207,7 @@ class _Merger:
                 self.remember((*path, new), inside[dropped])
                 _drop(dropped, data, inside, keys)
         for key, value in overlay[0].items():
-            at, place = (*path, key), overlay[1].inside[key]
+            at, location = (*path, key), overlay[1].inside[key]
             if value is None and not is_for_later(path):
                 self.note_removal(key in data, overlay[1].keys[key], at)
                 _drop(key, data, inside, keys)
@@ -213,20 +217,20 @@ class _Merger:
                     message = (
                         f"{'.'.join(map(str, at))} is there already, and {{}} changes nothing"
                     )
-                    self.found.append(_idle(message, place, inside[key]))
+                    self.findings.append(_idle(message, location, inside[key]))
                 if key in data and not isinstance(old, dict):
                     self.remember(at, inside[key])
                 under = (
                     (old, inside[key])
                     if isinstance(old, dict)
-                    else ({}, place.with_inside({}, {}))
+                    else ({}, location.with_inside({}, {}))
                 )
-                data[key], inside[key] = self.merge(under, (value, place), at)
+                data[key], inside[key] = self.merge(under, (value, location), at)
                 keys[key] = overlay[1].keys[key]
             else:
                 if key in data:
-                    self.note(data[key], inside[key], value, place, at)
-                data[key], inside[key], keys[key] = value, place, overlay[1].keys[key]
+                    self.note(data[key], inside[key], value, location, at)
+                data[key], inside[key], keys[key] = value, location, overlay[1].keys[key]
         return data, base[1].with_inside(inside, keys)
 
     def choices_at(self, path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
@@ -241,27 +245,29 @@ class _Merger:
             if any(data.get(key) is not None for key in keys)
         ]
 
-    def note_removal(self, was_there: bool, key: Place, path: Path) -> None:  # noqa: FBT001 (the fact itself)
+    def note_removal(self, was_there: bool, key: Location, path: Path) -> None:  # noqa: FBT001 (the fact itself)
         """Say so if nothing was removed."""
         if not was_there:
             message = f"{'.'.join(map(str, path))} is removed here, but does not exist"
-            self.found.append(finding("TF010", message, key.span))
+            self.findings.append(finding("TF010", message, key.span))
 
-    def remember(self, path: Path, old: Place) -> None:
+    def remember(self, path: Path, old: Location) -> None:
         """Remember that the value at the path was laid over the old one."""
         self.replaced[path] = (*self.above.get(path, ()), old.span, *self.below.get(path, ()))
 
-    def note(self, old: Any, old_place: Place, new: Any, place: Place, path: Path) -> None:
+    def note(
+        self, old: Any, old_place: Location, new: Any, location: Location, path: Path
+    ) -> None:
         """Remember what is replaced, and say so if that changes nothing."""
         self.remember(path, old_place)
         if self.is_overlay and type(old) is type(new) and old == new and path != ("tfcompose",):
             message = f"{'.'.join(map(str, path))} is {_show_value(new)} already"
-            self.found.append(_idle(message, place, old_place))
+            self.findings.append(_idle(message, location, old_place))
 
 
-def _idle(message: str, place: Place, old: Place | None = None) -> Finding:
+def _idle(message: str, location: Location, old: Location | None = None) -> Finding:
     notes = [Note("here", old.span)] if old else []
-    return finding("TF014", message, place.span, notes=notes, help="remove it")
+    return finding("TF014", message, location.span, notes=notes, help="remove it")
 
 
 def is_for_later(path: Path) -> bool:
@@ -299,9 +305,9 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
     ``ros``, of which the part has some of its own, ``settings``, and the ``variables`` that it is
     given.
     """
-    key = holder.at_key(path)
+    key = holder.key_span(path)
     own = part.mapping("ros")
-    found = []
+    findings = []
     for name in _SHARED_SETTINGS:
         wanted = getattr(ros, name)
         if name in own and own[name] != wanted:
@@ -309,9 +315,9 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
                 f"{name} of the part {path[-1]} is {own[name]}, and of the robot that holds it"
                 f" {wanted}"
             )
-            notes = [Note("set here", part.at(("ros", name)))]
+            notes = [Note("set here", part.span_of(("ros", name)))]
             advice = f"ros: {{{name}: {own[name]}}} here, or leave it out there"
-            found.append(finding("TF312", message, key, notes=notes, help=advice))
+            findings.append(finding("TF312", message, key, notes=notes, help=advice))
     frames = _frame_names(part)
     settings = {
         **settings,
@@ -320,15 +326,15 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
             name: getattr(ros, name) for name in _SHARED_SETTINGS if getattr(ros, name) is not None
         },
     }
-    here = Place(key)
-    inside = {"ros": Place(key, dict.fromkeys(settings, here), dict.fromkeys(settings, here))}
+    here = Location(key)
+    inside = {"ros": Location(key, dict.fromkeys(settings, here), dict.fromkeys(settings, here))}
     data: dict[str, Any] = {"ros": settings}
     if variables:
         data["vars"] = dict(variables)
         inside["vars"] = holder.places.nearest((*path, "vars"))
-    places = Place(key, inside, dict.fromkeys(data, here))
+    places = Location(key, inside, dict.fromkeys(data, here))
     over = Source(holder.file, places, data, has_nulls=False)
-    return lay_over(part, over, is_overlay=False), found
+    return lay_over(part, over, is_overlay=False), findings
 
 
 def _frame_names(source: Source) -> set[str]:
@@ -344,7 +350,7 @@ def _frame_names(source: Source) -> set[str]:
     return names
 
 
-def extended_by(preset: Source) -> str | None:
+def extended_preset(preset: Source) -> str | None:
     """Return the name of the preset that a preset's file is merged over, or None."""
     base = preset.data.get("extends")
     return base if isinstance(base, str) else None
@@ -360,11 +366,11 @@ def without(source: Source, key: str) -> Source:
     """Return the source without one of its sections."""
     if key not in source.data:
         return source
-    place = source.places
-    inside = {step: below for step, below in place.inside.items() if step != key}
-    keys = {name: below for name, below in place.keys.items() if name != key}
+    location = source.places
+    inside = {step: below for step, below in location.inside.items() if step != key}
+    keys = {name: below for name, below in location.keys.items() if name != key}
     data = {name: value for name, value in source.data.items() if name != key}
-    return replace(source, data=data, places=place.with_inside(inside, keys))
+    return replace(source, data=data, places=location.with_inside(inside, keys))
 
 
 def _wrong_profiles(source: Source) -> list[Finding]:
@@ -373,24 +379,26 @@ def _wrong_profiles(source: Source) -> list[Finding]:
     if not isinstance(profiles, dict):
         advice = "for example profiles: {demo: {…}}"
         return [
-            finding("TF103", "profiles is not a mapping", source.at(("profiles",)), help=advice)
+            finding(
+                "TF103", "profiles is not a mapping", source.span_of(("profiles",)), help=advice
+            )
         ]
-    found = []
+    findings = []
     for name, profile in profiles.items():
         if not isinstance(profile, dict):
             message, span = (
                 f"the profile {name} is not a mapping",
-                source.at_key(("profiles", name)),
+                source.key_span(("profiles", name)),
             )
-            found.append(
+            findings.append(
                 finding("TF103", message, span, help=f"for example {name}: {{sensors: {{…}}}}")
             )
         elif "profiles" in profile:
             message, span = (
                 f"the profile {name} holds profiles",
-                source.at_key(("profiles", name, "profiles")),
+                source.key_span(("profiles", name, "profiles")),
             )
-            found.append(
+            findings.append(
                 finding(
                     "TF101",
                     message,
@@ -398,7 +406,7 @@ def _wrong_profiles(source: Source) -> list[Finding]:
                     help="combine profiles instead: --profile a --profile b",
                 )
             )
-    return found
+    return findings
 
 
 def _unknown_profile(source: Source, name: str, read: Reader | None) -> Finding:
@@ -406,12 +414,12 @@ def _unknown_profile(source: Source, name: str, read: Reader | None) -> Finding:
     there = f"there is {', '.join(known)}" if known else "the file has no profiles"
     advice = did_you_mean(name, known, there)
     if parts := _parts_with_profile(source, name, read) if read else []:
-        entries = listed((f"{part}: {{profiles: [{name}]}}" for part in parts), 3)
+        entries = list_names((f"{part}: {{profiles: [{name}]}}" for part in parts), 3)
         advice = (
             f"{'a part has' if len(parts) == 1 else 'parts have'} it: write"
             f" profiles: {{{name}: {{parts: {{{entries}}}}}}}"
         )
-    span = source.at_key(("profiles",))
+    span = source.key_span(("profiles",))
     return finding("TF009", f"unknown profile {name}", span, help=advice)
 
 
@@ -422,7 +430,7 @@ def _parts_with_profile(source: Source, profile: str, read: Reader) -> list[str]
         spec = inside.get("spec") if isinstance(inside, dict) else None
         if not isinstance(spec, str):
             continue
-        file = path_named(spec, source.at(("parts", part, "spec")))
+        file = find_path(spec, source.span_of(("parts", part, "spec")))
         with contextlib.suppress(RejectedError):
             if profile in with_includes(load_named(read(file), file), read).mapping("profiles"):
                 parts.append(part)
@@ -454,7 +462,7 @@ class _Includer:
             return source
         base: Source | None = None
         for index, name in self._names(source):
-            at = source.at(
+            span = source.span_of(
                 ("include", index) if isinstance(source.data["include"], list) else ("include",)
             )
             file = posixpath.normpath(posixpath.join(posixpath.dirname(source.file), name))
@@ -467,9 +475,9 @@ class _Includer:
                     else f"more than {MOST_FILES} files"
                 )
                 raise RejectedError(
-                    [*source.found, finding("TF015", message, at, help="remove one include")]
+                    [*source.findings, finding("TF015", message, span, help="remove one include")]
                 )
-            included = self.include(self._load(file, at, source), (*chain, file))
+            included = self.include(self._load(file, span, source), (*chain, file))
             base = lay_over(base, included, is_overlay=False) if base else included
         own = without(source, "include")
         if base is None:
@@ -486,23 +494,26 @@ class _Includer:
         if wrong:
             advice = "for example include: [base.yaml]"
             found = finding(
-                "TF103", "include takes the names of files", source.at(("include",)), help=advice
+                "TF103",
+                "include takes the names of files",
+                source.span_of(("include",)),
+                help=advice,
             )
-            raise RejectedError([*source.found, found])
+            raise RejectedError([*source.findings, found])
         return list(enumerate(names))
 
-    def _load(self, file: str, at: Span, source: Source) -> Source:
+    def _load(self, file: str, span: Span, source: Source) -> Source:
         try:
             return load_named(self.read(file), file)
         except RejectedError as error:
             raise RejectedError(
-                [*source.found, *(_with_include(finding, at) for finding in error.findings)]
+                [*source.findings, *(_with_include(finding, span) for finding in error.findings)]
             ) from None
 
 
-def _with_include(found: Finding, at: Span) -> Finding:
+def _with_include(finding: Finding, span: Span) -> Finding:
     """Return the finding about an included file, with the place that includes it."""
-    return replace(found, notes=(*found.notes, Note("included here", at)))
+    return replace(finding, notes=(*finding.notes, Note("included here", span)))
 
 
 def set_value(setting: str) -> Source:
@@ -531,8 +542,8 @@ def set_value(setting: str) -> Source:
     read = load(f"value: {value_text.strip() or 'null'}", span.file)
     data: Any = read.data["value"]
     below = read.places.inside["value"]
-    full = Place(Span(span.file, 1, 1, below.span.end_line, below.span.end_column))
-    place = full.with_inside(below.inside, below.keys)
+    full = Location(Span(span.file, 1, 1, below.span.end_line, below.span.end_column))
+    location = full.with_inside(below.inside, below.keys)
     for step in reversed(path):
-        data, place = {step: data}, full.with_inside({step: place}, {str(step): full})
-    return Source(span.file, place, data, found=read.found)
+        data, location = {step: data}, full.with_inside({step: location}, {str(step): full})
+    return Source(span.file, location, data, findings=read.findings)

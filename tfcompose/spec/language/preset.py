@@ -332,10 +332,12 @@ def _options(preset: PresetSpec) -> Iterator[SpecRefusal]:
     for path, condition in _conditions(preset):
         for name, wanted in condition.items():
             yield from _condition(preset, (*path, name), wanted)
-    for at, value in _chosen(preset):
+    for path, value in _chosen_options(preset):
         if value.option and value.option not in preset.options:
             advice = did_you_mean(value.option, preset.options)
-            yield SpecRefusal("TF606", at, f"{preset.model} has no option {value.option}", advice)
+            yield SpecRefusal(
+                "TF606", path, f"{preset.model} has no option {value.option}", advice
+            )
 
 
 def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[SpecRefusal]:
@@ -368,12 +370,12 @@ def _conditions(preset: PresetSpec) -> Iterator[tuple[Path, dict[str, Any]]]:
         yield ("topics", name, "when"), topic.when
     for name, process in preset.driver.also.items() if preset.driver else ():
         yield ("driver", "also", name, "when"), process.when
-    for at, value in _chosen(preset):
+    for path, value in _chosen_options(preset):
         if value.when:
-            yield (*at, "when"), value.when
+            yield (*path, "when"), value.when
 
 
-def _chosen(preset: PresetSpec) -> Iterator[tuple[Path, Chosen]]:
+def _chosen_options(preset: PresetSpec) -> Iterator[tuple[Path, Chosen]]:
     """Yield the parameters and arguments that depend on options, and where they are."""
     for path, process in _processes(preset):
         for section, table in (("params", process.params), ("args", process.args)):

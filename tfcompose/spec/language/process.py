@@ -26,8 +26,8 @@ from tfcompose.foundation.units import (
     Rate,
     Size,
     Truth,
+    format_value,
     invalid,
-    shown,
 )
 from tfcompose.model.plan import (
     LifecycleState,
@@ -95,7 +95,9 @@ def _split(value: Any) -> Any:
         return shlex.split(value) if isinstance(value, str) else value
     except ValueError as error:
         raise invalid(
-            "TF106", f"{shown(value)} cannot be split into words: {error}", "a list of words"
+            "TF106",
+            f"{format_value(value)} cannot be split into words: {error}",
+            "a list of words",
         ) from None
 
 
@@ -113,7 +115,9 @@ def _arguments(value: Any) -> Any:
             *(
                 (
                     (name,),
-                    invalid("TF103", f"expected a string or a number, got {shown(value[name])}"),
+                    invalid(
+                        "TF103", f"expected a string or a number, got {format_value(value[name])}"
+                    ),
                 )
                 for name in wrong
             )
@@ -124,7 +128,7 @@ def _arguments(value: Any) -> Any:
 def _argument(value: Any) -> str:
     if isinstance(value, Quantity):
         value = int(value.value) if value.value == int(value.value) else value.value
-    return value if isinstance(value, str) else shown(value)
+    return value if isinstance(value, str) else format_value(value)
 
 
 Arguments = Annotated[Words, BeforeValidator(_arguments, Words | dict[str, Any])]
@@ -257,7 +261,7 @@ class ScheduleSpec(Checked):
         None, "the priority of fifo and rr, 1 to 99", 80
     )
 
-    def planned(self) -> Schedule:
+    def to_plan(self) -> Schedule:
         """Return the schedule as the plan has it."""
         usual: SchedulingPolicy = "fifo" if self.priority else "other"
         return Schedule(self.cpus, self.policy or usual, self.priority or 0)
@@ -294,7 +298,7 @@ class StopSpec(Spec):
         None, "time from SIGTERM to SIGKILL; default: timeout", "10 s"
     )
 
-    def planned(self) -> StopRule:
+    def to_plan(self) -> StopRule:
         """Return the rule as the plan has it."""
         return StopRule(self.signal, self.timeout, self.kill_timeout)
 
@@ -303,7 +307,9 @@ def _is_regular(value: str) -> str:
     try:
         re.compile(value)
     except (re.error, RecursionError, OverflowError) as error:
-        raise invalid("TF106", f"{shown(value)} is not a regular expression: {error}") from None
+        raise invalid(
+            "TF106", f"{format_value(value)} is not a regular expression: {error}"
+        ) from None
     return value
 
 

@@ -18,9 +18,9 @@ from pydantic import ValidationError
 
 from tfcompose.foundation.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
 from tfcompose.foundation.tool import absent
-from tfcompose.foundation.units import shown
+from tfcompose.foundation.units import format_value
 from tfcompose.spec.language.habits import habit, usual_value
-from tfcompose.spec.language.spec import FIRST, at, fields_of, kinds_of, mapping_at
+from tfcompose.spec.language.spec import FIRST, fields_of, kinds_of, mapping_at, value_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -54,8 +54,8 @@ class SpecRefusal:
 
     def finding(self, source: Source) -> Finding:
         """Return the finding at its place in the source."""
-        span = source.at_key(self.path) if self.on_key else source.at(self.path)
-        notes = [Note("the other one", source.at_key(self.other))] if self.other else []
+        span = source.key_span(self.path) if self.on_key else source.span_of(self.path)
+        notes = [Note("the other one", source.key_span(self.other))] if self.other else []
         edits = [Edit(span, self.instead)] if self.instead is not None else []
         replacement = (
             _overlay_advice(source, self.path)
@@ -304,14 +304,16 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> SpecRefusal:
         advice = f"for example {path[-1]}: {field.examples[0]}" if field.examples else ""
         return SpecRefusal("TF102", path[:-1], f"{path[-1]} is missing", advice, on_key=True)
     if kind == "literal_error":
-        allowed = [str(text) for text in _words_allowed(model, path)]
+        allowed = [str(text) for text in _allowed_values(model, path)]
         advice = f"one of: {', '.join(allowed)}"
         advice = (
             did_you_mean(usual_value(value, allowed), allowed, advice)
             if isinstance(value, str)
             else advice
         )
-        return SpecRefusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
+        return SpecRefusal(
+            "TF106", path, f"{format_value(value)} is not allowed here", advice, on_key
+        )
     code, message, advice = WORDS.get(kind, UNFORESEEN)
     if kind == "string_type":
         advice = _as_string(value)
@@ -324,7 +326,9 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> SpecRefusal:
             advice = f"{path[-1]} belongs to the entry above: indent it more than the name of that"
     elif kind == "dict_type":
         advice = _as_mapping(model, path, value)
-    return SpecRefusal(code, path, message.format(value=shown(value), **context), advice, on_key)
+    return SpecRefusal(
+        code, path, message.format(value=format_value(value), **context), advice, on_key
+    )
 
 
 def _example(model: type[Spec], path: Path, value: Any) -> str:
@@ -334,7 +338,7 @@ def _example(model: type[Spec], path: Path, value: Any) -> str:
     """
     keys = fields_of(mapping_at(model, path))
     required = [name for name, field in keys.items() if field.is_required()]
-    of_word = [name for name in keys if value in _words_allowed(model, (*path, name))]
+    of_word = [name for name in keys if value in _allowed_values(model, (*path, name))]
     chosen = of_word or [name for name in keys if name == value] or required
     if isinstance(value, str) and value not in keys and len(chosen) == 1:
         return f"for example {{{chosen[0]}: {value}}}"
@@ -345,11 +349,11 @@ def _example(model: type[Spec], path: Path, value: Any) -> str:
     return f"for example {{{', '.join(pairs)}}}"
 
 
-def _words_allowed(model: type[Spec], path: Path) -> list[Any]:
+def _allowed_values(model: type[Spec], path: Path) -> list[Any]:
     """Return the words that may stand at a path, where these are listed."""
     return [
         text
-        for kind in kinds_of(at(model, path))
+        for kind in kinds_of(value_at(model, path))
         if get_origin(kind) is Literal
         for text in get_args(kind)
     ]
@@ -433,7 +437,7 @@ def _in_yaml(value: Any) -> str:
     return (
         value
         if isinstance(value, str) and re.fullmatch(r"[A-Za-z_/][\w/.]*", value)
-        else shown(value)
+        else format_value(value)
     )
 
 

@@ -12,7 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
-from tfcompose.foundation.tool import shipped
+from tfcompose.foundation.tool import shipped_tools
 from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.preset import PresetSpec
 from tfcompose.spec.language.robot import RobotSpec
@@ -28,7 +28,7 @@ _KEY = re.compile(r"""^(?:\{\s*)?["']?([A-Za-z_][\w-]*)["']?\s*:(?=[\s{\[]|$)"""
 #: Versions of the core's language and of tools', which only their files say, wherever that is.
 _SURE = re.compile(
     r"""^\s*\{?\s*["']?(?:"""
-    + "|".join(("tfcompose", "preset", *shipped().languages()))
+    + "|".join(("tfcompose", "preset", *shipped_tools().languages()))
     + r""")["']?\s*:\s*\d""",
     re.MULTILINE,
 )
@@ -40,7 +40,7 @@ _NOTHING = re.compile(r"(?:\s|#[^\n]*(?:\n|\Z)|---|\{\s*\})*")
 def _keys() -> frozenset[str]:
     """Return the keys at the top of robot files and presets."""
     models = (RobotSpec, PresetSpec, NodePresetSpec)
-    return frozenset().union(*(model.model_fields for model in models), shipped().keys())
+    return frozenset().union(*(model.model_fields for model in models), shipped_tools().keys())
 
 
 def is_recognized(text: str, keys: Collection[str] = ()) -> bool:

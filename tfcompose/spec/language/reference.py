@@ -10,7 +10,7 @@ import types
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
-from tfcompose.foundation.tool import installed
+from tfcompose.foundation.tool import installed_tools
 from tfcompose.foundation.units import Measure
 from tfcompose.foundation.yaml_text import flow
 from tfcompose.spec.language.json_schema import model_of
@@ -84,7 +84,7 @@ def reference_of(language: str) -> Reference:
     places: dict[Any, list[str]] = {}
     for pattern, kind in walk(model_of(language)):
         places.setdefault(kind, []).append(_place(pattern))
-    head = _HEAD.get(language) or installed().languages()[language].title
+    head = _HEAD.get(language) or installed_tools().languages()[language].title
     return Reference(
         f"{head}, version 1",
         rules=(_VALUES, *([_EXPRESSIONS] if language == "robot" else []), _REQUIRED),
@@ -110,23 +110,35 @@ def key_page(path: str) -> str | None:
     """
     steps = tuple(path.split("."))
     places = [(pattern, kind) for pattern, kind in walk(model_of("robot")) if pattern]
-    found: dict[tuple[str, ...], list[str]] = {}
-    for at, kind in _with_key(steps):
+    places_by_text: dict[tuple[str, ...], list[str]] = {}
+    for pattern, kind in _with_key(steps):
         field = fields_of(kind)[steps[-1]]
         default, example = _default(field), _examples(field)
         lines = [describe_key(field), "", f"- type: {_type(field.rebuild_annotation())}"]
         lines += [f"- default: {default}"] * bool(default)
         lines += [f"- example: {example}"] * bool(example)
-        found.setdefault(tuple(lines), []).append(_place((*at, steps[-1])))
+        places_by_text.setdefault(tuple(lines), []).append(_place((*pattern, steps[-1])))
     lines = [
-        line for about, at in found.items() for line in (f"## {_list_places(at)}", "", *about, "")
+        line
+        for about, names in places_by_text.items()
+        for line in (f"## {_list_places(names)}", "", *about, "")
     ]
-    sections = [(at, kind) for at, kind in places if at[-1] != "*" and _is_at(at, steps)]
-    sections += [(at, kind) for at, kind in places if at[-1] == "*" and _is_at(at[:-1], steps)]
-    sections = sections or [(at, kind) for at, kind in places if steps == (_title(kind).lower(),)]
+    sections = [
+        (pattern, kind)
+        for pattern, kind in places
+        if pattern[-1] != "*" and _is_at(pattern, steps)
+    ]
+    sections += [
+        (pattern, kind)
+        for pattern, kind in places
+        if pattern[-1] == "*" and _is_at(pattern[:-1], steps)
+    ]
+    sections = sections or [
+        (pattern, kind) for pattern, kind in places if steps == (_title(kind).lower(),)
+    ]
     if sections:
         kind = sections[0][1]
-        lines += _table(_section(kind, [_place(at) for at, other in places if other is kind]))
+        lines += _table(_section(kind, [_place(path) for path, other in places if other is kind]))
     return "\n".join(lines).rstrip() + "\n" if lines else None
 
 
@@ -151,8 +163,8 @@ def paths() -> list[str]:
     """Return where each key of a robot file is, such as ``sensors.place``, without names."""
     found = walk(model_of("robot"))
     return [
-        ".".join(step for step in (*at, name) if step != "*")
-        for at, kind in found
+        ".".join(step for step in (*path, name) if step != "*")
+        for path, kind in found
         for name in fields_of(kind)
     ]
 

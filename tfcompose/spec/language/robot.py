@@ -21,12 +21,12 @@ from tfcompose.foundation.units import (
     Truth,
     UnitError,
     example,
+    format_value,
     invalid,
     quantity,
-    shown,
     with_article,
 )
-from tfcompose.model.fields import documented
+from tfcompose.model.fields import documented_field
 from tfcompose.model.plan import (
     GuardPolicy,
     Isolation,
@@ -44,7 +44,15 @@ from tfcompose.spec.language.optics import OpticsSpec
 from tfcompose.spec.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
 from tfcompose.spec.language.process import ContainerSpec, Driver, ProcessSpec
 from tfcompose.spec.language.rules import RuleSetting, ZoneSpec
-from tfcompose.spec.language.spec import Entry, Spec, below, inherited, key, measure_of, several
+from tfcompose.spec.language.spec import (
+    Entry,
+    Spec,
+    below,
+    inherit_field,
+    key,
+    measure_of,
+    several,
+)
 from tfcompose.spec.language.values import (
     Axis,
     Boolean,
@@ -97,7 +105,9 @@ class Mimic(Spec):
 
 def _only_one(value: Any) -> Any:
     if isinstance(value, list):
-        raise invalid("TF103", f"expected a string, got {shown(value)}", "a joint has one parent")
+        raise invalid(
+            "TF103", f"expected a string, got {format_value(value)}", "a joint has one parent"
+        )
     return [value]
 
 
@@ -177,7 +187,7 @@ def _scalar(value: Any) -> str:
     """Return the string that stands in XML: a parameter has no type there."""
     if isinstance(value, Quantity):
         if value.dimension != NUMBER:
-            raise invalid("TF104", f"{shown(value)} has a unit, and a parameter has none")
+            raise invalid("TF104", f"{format_value(value)} has a unit, and a parameter has none")
         value = value.value
     value = value.value if isinstance(value, Truth) else value
     if isinstance(value, bool):
@@ -186,7 +196,9 @@ def _scalar(value: Any) -> str:
         return str(value)
     if isinstance(value, float):
         return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)  # noqa: PLR2004 (exact)
-    raise invalid("TF103", f"expected a string, a number, true or false, got {shown(value)}")
+    raise invalid(
+        "TF103", f"expected a string, a number, true or false, got {format_value(value)}"
+    )
 
 
 #: A parameter in XML, as the string that stands there.
@@ -199,7 +211,7 @@ def _by_name(value: Any) -> Any:
         return value
     wrong = [index for index, name in enumerate(value) if not isinstance(name, str)]
     if wrong:
-        got = {index: f"expected a string, got {shown(value[index])}" for index in wrong}
+        got = {index: f"expected a string, got {format_value(value[index])}" for index in wrong}
         raise several(*(((index,), invalid("TF103", message)) for index, message in got.items()))
     return {name: {} for name in value}
 
@@ -473,19 +485,19 @@ class RosSpec(RosSettings):
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    namespace: Namespace = inherited(RosSettings, "namespace")
-    domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Integral] | None = inherited(
+    namespace: Namespace = inherit_field(RosSettings, "namespace")
+    domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Integral] | None = inherit_field(
         RosSettings, "domain_id"
     )
     router: (
         Annotated[Text, Matches(ENDPOINT, "an endpoint of Zenoh such as tcp/10.0.0.2:7447")] | None
-    ) = inherited(RosSettings, "router")
-    isolate: Isolation = documented(
+    ) = inherit_field(RosSettings, "router")
+    isolate: Isolation = documented_field(
         "none",
         "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless "
         "frame_prefix is set",
     )
-    state_publisher: StatePublisher = documented(
+    state_publisher: StatePublisher = documented_field(
         "tfcompose",
         "stock: robot_state_publisher publishes the edges below base that tfcompose owns",
     )
@@ -616,10 +628,10 @@ class RobotSpec(Spec):
         """Take the spans of what the spec was validated from."""
         self._spans = spans
 
-    def at(self, path: Path) -> Span:
+    def span_of(self, path: Path) -> Span:
         """Return the value's place, or that of the nearest mapping or list around it."""
-        return self._spans.at(path)
+        return self._spans.span_of(path)
 
-    def at_key(self, path: Path) -> Span:
+    def key_span(self, path: Path) -> Span:
         """Return the place of the key, or of the nearest key around it."""
-        return self._spans.at_key(path)
+        return self._spans.key_span(path)

@@ -9,9 +9,9 @@ from tfcompose.foundation.units import (
     Number,
     Quantity,
     UnitError,
+    format_value,
     invalid,
     quantity,
-    shown,
 )
 from tfcompose.spec.language.spec import Spec, key
 from tfcompose.spec.language.values import OneOrMore, Sizes, Text, Xyz
@@ -26,7 +26,9 @@ def _percent(value: Any) -> Any:
         try:
             return Quantity(quantity(number).value / 100, NUMBER)
         except UnitError as error:
-            raise invalid("TF103", f"{shown(value)} is not a percentage", error.advice) from None
+            raise invalid(
+                "TF103", f"{format_value(value)} is not a percentage", error.advice
+            ) from None
     return value
 
 
@@ -42,7 +44,7 @@ def _limit(value: Any) -> Quantity:
         value = Quantity(float(value))
     if not isinstance(value, Quantity):
         raise invalid(
-            "TF103", f"{shown(value)} is not a limit", "for example 30 %, 45 deg or 5 cm"
+            "TF103", f"{format_value(value)} is not a limit", "for example 30 %, 45 deg or 5 cm"
         )
     if value.value < 0:
         raise invalid("TF106", "a limit is not less than 0")
@@ -54,7 +56,7 @@ def _part(value: Any) -> Any:
     number = value.value if isinstance(value, Quantity) else value
     if isinstance(number, (int, float)) and not 0 <= number <= 1:
         raise invalid(
-            "TF106", f"{shown(value)} is not a part of the zone", "for example 90 %, or 0.9"
+            "TF106", f"{format_value(value)} is not a part of the zone", "for example 90 %, or 0.9"
         )
     return value
 

@@ -150,7 +150,7 @@ def more_of(field: FieldInfo, name: str, default: Any) -> Any:
     return more.get(name, default) if isinstance(more, dict) else default
 
 
-def inherited(of: type, name: str) -> Any:
+def inherit_field(of: type, name: str) -> Any:
     """Return a dataclass's field for a subclass that narrows its type.
 
     Default and description stay.
@@ -235,7 +235,7 @@ def measure_of(annotation: Any) -> Measure | None:
     return None
 
 
-def at(model: Any, path: tuple[str | int, ...]) -> Any:
+def value_at(model: Any, path: tuple[str | int, ...]) -> Any:
     """Return the annotation of what is at a path in a file of the model, or None."""
     for step in path:
         model = below(model, step)
@@ -244,7 +244,7 @@ def at(model: Any, path: tuple[str | int, ...]) -> Any:
 
 def mappings_at(model: Any, path: tuple[str | int, ...]) -> list[Any]:
     """Return the mappings with known keys that may stand at a path, or in a list there."""
-    kinds = list(kinds_of(at(model, path)))
+    kinds = list(kinds_of(value_at(model, path)))
     kinds += [
         item for kind in kinds if get_origin(kind) is tuple for item in kinds_of(get_args(kind)[0])
     ]

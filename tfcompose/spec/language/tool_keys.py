@@ -14,7 +14,7 @@ from pydantic import create_model
 from pydantic_core import to_jsonable_python
 
 from tfcompose.foundation.findings import Finding, finding
-from tfcompose.foundation.tool import Key, Problem, Toolset, installed, load, shipped
+from tfcompose.foundation.tool import Key, Problem, Toolset, installed_tools, load, shipped_tools
 from tfcompose.spec.language.robot import RobotSpec
 from tfcompose.spec.language.spec import key
 
@@ -32,7 +32,7 @@ def keys_in(names: Collection[str]) -> list[Key]:
     return [section for name, section in _tools_for(names).keys().items() if name in names]
 
 
-def planned_data(section: Key, value: Any) -> Any:
+def data_for_plan(section: Key, value: Any) -> Any:
     """Return a section as the plan holds it, as JSON; None where the plan has none of it."""
     if section.in_plan:
         return to_jsonable_python(value)
@@ -51,7 +51,7 @@ def problems_with(names: Collection[str]) -> list[Finding]:
 
 def full_robot_model() -> type[RobotSpec]:
     """Return the model of a robot file with the sections of all installed tools."""
-    return _model(installed())
+    return _model(installed_tools())
 
 
 _NO_TOOLS = Toolset(())
@@ -65,7 +65,7 @@ def _tools_for(names: Collection[str]) -> Toolset:
     unknown = set(names) - RobotSpec.model_fields.keys()
     if not unknown:
         return _NO_TOOLS
-    return shipped() if unknown <= shipped().keys().keys() else installed()
+    return shipped_tools() if unknown <= shipped_tools().keys().keys() else installed_tools()
 
 
 @cache

@@ -17,7 +17,7 @@ from tfcompose.spec.language.rules import RuleSpec, level_of
 from tfcompose.spec.language.spec import Spec
 from tfcompose.spec.language.tool_keys import problems_with, robot_model
 from tfcompose.spec.language.values import plain
-from tfcompose.spec.language.variables import Variables, unused
+from tfcompose.spec.language.variables import Variables, unused_variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
@@ -46,7 +46,7 @@ class Validated:
 
     spec: RobotSpec
     source: Source
-    found: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
     refused: frozenset[Path] = frozenset()
     unused: tuple[tuple[str, str], ...] = ()
     given: Given = _NOTHING
@@ -88,7 +88,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
         RejectedError: if so much is missing that no robot is left (its name, or the version).
     """
     variables = Variables(source, given)
-    idle = unused(source.data, aside)
+    idle = unused_variables(source.data, aside)
     done = unfold(source, variables)
     source = done.source
     nulls = _nulls(source)
@@ -96,14 +96,14 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     already = [*(null.path for null in nulls), *variables.uncomputed]
     spec, refusals = read(robot_model(source.data), data, already)
     own = _findings([*nulls, *variables.refusals, *refusals], source)
-    found = (
-        *source.found,
-        *without_duplicates([*variables.found, *done.found]),
+    findings = (
+        *source.findings,
+        *without_duplicates([*variables.findings, *done.findings]),
         *own,
         *problems_with(source.data),
     )
     if spec is None:
-        raise RejectedError(found)
+        raise RejectedError(findings)
     spec.carry(source)
     refused = frozenset([*already, *done.refused, *(refusal.path for refusal in refusals)])
     entries = {_entry(path) for path in refused}
@@ -116,7 +116,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     return Validated(
         _with_ros_arguments(spec, given.ros),
         source,
-        found,
+        findings,
         refused=refused,
         unused=idle,
         given=given,
@@ -177,9 +177,9 @@ def validate_file(
     refusals = [*nulls, *refused]
     if spec is not None and not refusals:
         refusals = list(check(spec))
-    found = (*source.found, *_findings(refusals, source))
-    if found or spec is None:
-        raise RejectedError(found)
+    findings = (*source.findings, *_findings(refusals, source))
+    if findings or spec is None:
+        raise RejectedError(findings)
     return spec
 
 

@@ -24,8 +24,8 @@ from tfcompose.foundation.units import (
     Quantity,
     Size,
     Truth,
+    format_value,
     invalid,
-    shown,
 )
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Matches:
         """
         if re.fullmatch(self.pattern, value):
             return value
-        raise invalid("TF106", f"{shown(value)} is not {self.means}")
+        raise invalid("TF106", f"{format_value(value)} is not {self.means}")
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: Callable[[Any], CoreSchema]
@@ -109,7 +109,9 @@ class InARow:
         if isinstance(value, list) and len(value) == self.count:
             return value
         raise invalid(
-            "TF103", f"expected a list of {self.count}, got {shown(value)}", self._advice(value)
+            "TF103",
+            f"expected a list of {self.count}, got {format_value(value)}",
+            self._advice(value),
         )
 
     def _advice(self, value: Any) -> str:
@@ -153,7 +155,7 @@ def short(name: str, of: Any) -> BeforeValidator:
     )
 
 
-def listed(value: Any) -> Any:
+def as_list(value: Any) -> Any:
     """Return a list, for which one item may stand."""
     return value if isinstance(value, list) else [value]
 
@@ -186,7 +188,7 @@ def _is_true(value: Any) -> bool:
     is_meant = isinstance(value, str) and value.lower() in {"yes", "on"}
     raise invalid(
         "TF106",
-        f"expected true, got {shown(value)}",
+        f"expected true, got {format_value(value)}",
         "write true" if is_meant else "write true, or remove the key",
     )
 
@@ -204,7 +206,7 @@ def _with_opacity(value: Any) -> Any:
             advice = did_you_mean(
                 value, COLOURS, f"[0.2, 0.4, 0.8], or one of: {', '.join(COLOURS)}"
             )
-            raise invalid("TF106", f"{shown(value)} is not a colour", advice)
+            raise invalid("TF106", f"{format_value(value)} is not a colour", advice)
         return [*COLOURS[value], 1.0]
     return [*value, 1.0] if isinstance(value, list) and len(value) == len(_AXES) else value
 
@@ -214,7 +216,7 @@ def _colour_part(value: float) -> float:
         return value
     raise invalid(
         "TF106",
-        f"{shown(value)} is not a colour component: 0 to 1",
+        f"{format_value(value)} is not a colour component: 0 to 1",
         "divide values up to 255 by 255",
     )
 
@@ -308,7 +310,7 @@ RosName = Annotated[
 VariableName = Annotated[Text, AfterValidator(_names_a_variable)]
 Texts = tuple[Text, ...]
 #: A list of strings, or one string for a list of one.
-OneOrMore = TypeAliasType("OneOrMore", Annotated[Texts, BeforeValidator(listed, Text | Texts)])
+OneOrMore = TypeAliasType("OneOrMore", Annotated[Texts, BeforeValidator(as_list, Text | Texts)])
 Xyz = TypeAliasType("Xyz", Annotated[tuple[Length, Length, Length], InARow(3, "[0.2, 0, 30 cm]")])
 Sizes = Annotated[tuple[Size, Size, Size], InARow(3, "[0.5, 0.4, 0.15]")]
 Numbers = Annotated[tuple[Number, Number, Number], InARow(3, "[0, 0, 1]")]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from tfcompose.foundation.findings import Finding, Note, Span, did_you_mean, finding
-from tfcompose.foundation.units import NUMBER, Quantity, Truth, UnitError, quantity, shown
+from tfcompose.foundation.units import NUMBER, Quantity, Truth, UnitError, format_value, quantity
 from tfcompose.spec.language.args import ArgError, ArgSpec, Given, GivenArg, full
 from tfcompose.spec.language.expressions import (
     A_FILE,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path, Source
 
 
-def unused(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str, str], ...]:
+def unused_variables(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str, str], ...]:
     """Return the variables and arguments that no ``${…}`` in ``data`` or ``aside`` names."""
     declared: dict[str, tuple[str, str]] = {}
     for section, prefix in (("vars", ""), ("args", "args.")):
@@ -121,7 +121,7 @@ class NothingNewError(ExpressionError):
 class Variables:
     """The variables and arguments of a robot file, and what is computed from them.
 
-    ``refusals`` are what was refused, ``found`` what is wrong with values that arguments were
+    ``refusals`` are what was refused, ``findings`` what is wrong with values that arguments were
     given, and ``uncomputed`` the paths of what could not be computed. ``args`` holds the
     arguments' values, None where one was refused, and ``environment`` what the variables that
     ``env`` names were, or what stood for them.
@@ -132,7 +132,7 @@ class Variables:
         self.given = source.mapping("vars")
         self.outside = given
         self.refusals: list[SpecRefusal] = []
-        self.found: list[Finding] = []
+        self.findings: list[Finding] = []
         self.uncomputed: list[Path] = []
         self.known: dict[str, Value | None] = {}  # None: it was refused
         self.args: dict[str, Value | None] = {}
@@ -175,17 +175,17 @@ class Variables:
                     else f"{self.source.file} has no args"
                 )
                 advice = did_you_mean(name, declared, there)
-                self.found.append(
-                    finding("TF016", f"unknown argument {name}", given.at, help=advice)
+                self.findings.append(
+                    finding("TF016", f"unknown argument {name}", given.span, help=advice)
                 )
 
     def _arg(self, name: str, raw: Any) -> Value | None:
         """Return the argument's value, or None after noting why it has none."""
-        at: Path = ("args", name)
+        path: Path = ("args", name)
         declared = dict(full(raw))
         default = declared.get("default")
         if isinstance(default, str) and "${" in default:
-            place = (*at, "default") if isinstance(raw, dict) else at
+            place = (*path, "default") if isinstance(raw, dict) else path
             if (filled := self.fill(default, place)) is default:
                 return None
             declared["default"] = filled
@@ -193,27 +193,29 @@ class Variables:
             spec = ArgSpec.model_validate(declared)
         except ValidationError:
             return None  # it is refused where the whole is read
-        given = self._given(name, spec)
-        notes = [Note(f"args.{name} is declared here", self.source.at_key(at))]
+        given = self._given_arg(name, spec)
+        notes = [Note(f"args.{name} is declared here", self.source.key_span(path))]
         if given is None and spec.default is None:
             message, advice = (
                 f"the argument {name} has no value",
                 f"give {name}:=VALUE, or a default",
             )
-            self.found.append(finding("TF102", message, self.source.at_key(at), help=advice))
+            self.findings.append(
+                finding("TF102", message, self.source.key_span(path), help=advice)
+            )
             return None
         try:
             return spec.value(spec.default if given is None else given.value)
         except ArgError as error:
             if given:  # else its default is refused where the whole is read
-                self.found.append(
+                self.findings.append(
                     finding(
-                        error.code, f"{name}: {error}", given.at, help=error.advice, notes=notes
+                        error.code, f"{name}: {error}", given.span, help=error.advice, notes=notes
                     )
                 )
             return None
 
-    def _given(self, name: str, spec: ArgSpec) -> GivenArg | None:
+    def _given_arg(self, name: str, spec: ArgSpec) -> GivenArg | None:
         if name in self.outside.args:
             return self.outside.args[name]
         value = self.outside.environment.get(spec.env) if spec.env else None
@@ -357,7 +359,7 @@ class Variables:
             )
         if isinstance(given, bool) or not isinstance(given, (int, float, str)):
             raise ExpressionError(
-                f"the variable {name} is {shown(given)}", "a number, a quantity or a string"
+                f"the variable {name} is {format_value(given)}", "a number, a quantity or a string"
             )
         if not isinstance(given, str):
             return Quantity(given)

@@ -4,26 +4,26 @@ YAML robot files, calibration files and parameter files of ROS; text comes from 
 not import ``language``, ``model``, ``plan``, ``pydantic``: it knows no key of the language.
 """
 
-from tfcompose.spec.load.nodes import DEEPEST, Path, Place
+from tfcompose.spec.load.nodes import DEEPEST, Location, Path
 from tfcompose.spec.load.source import (
     MOST_VALUES,
     Source,
     Spans,
     allows_in_xml,
+    find_path,
     load,
-    path_named,
     refuse_unreadable,
 )
 
 __all__ = [
     "DEEPEST",
     "MOST_VALUES",
+    "Location",
     "Path",
-    "Place",
     "Source",
     "Spans",
     "allows_in_xml",
+    "find_path",
     "load",
-    "path_named",
     "refuse_unreadable",
 ]

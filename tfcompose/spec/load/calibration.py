@@ -15,7 +15,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.foundation.findings import Span, finding
-from tfcompose.spec.load.nodes import DocumentReader, Place
+from tfcompose.spec.load.nodes import DocumentReader, Location
 from tfcompose.spec.load.scalars import FLOAT, INT, implicit_tag, scalar
 from tfcompose.spec.load.source import Source, refuse_unreadable
 
@@ -66,26 +66,26 @@ def _is_row(line: str) -> bool:
 def _documents(text: str, file: str) -> Iterator[Source]:
     reader = _CalibrationReader(file)
     reader.read(text, single=False)
-    found = tuple(reader.found)
-    for data, place in reader.documents:
+    findings = tuple(reader.findings)
+    for data, location in reader.documents:
         if data is not None and (
             not isinstance(data, str) or data.strip()
         ):  # ros2 topic echo ends with ---
-            yield Source(file, place, data, found=found)
-            found = ()
+            yield Source(file, location, data, findings=findings)
+            findings = ()
 
 
 class _CalibrationReader(DocumentReader):
     """Reads numbers with xacro's tags for angles too, in radians."""
 
-    def tagged(self, tag: str, text: str, place: Place) -> Any:
+    def read_tagged(self, tag: str, text: str, location: Location) -> Any:
         """Return the value of a scalar with a tag."""
         if tag not in ANGLE_TAGS:
-            return super().tagged(tag, text, place)
+            return super().read_tagged(tag, text, location)
         kind = implicit_tag(text.strip())
         if kind not in {INT, FLOAT}:
             message, advice = f"{tag} takes a number, not {text[:40]!r}", "write the number"
-            self.found.append(finding("TF005", message, place.span, help=advice))
+            self.findings.append(finding("TF005", message, location.span, help=advice))
             return 0.0
         return float(scalar(kind, text.strip()) or 0) * ANGLE_TAGS[tag]
 
@@ -104,19 +104,19 @@ class _LineOffsets:
 
 
 def _rows(lines: list[str], file: str) -> Source:
-    places: dict[str | int, Place] = {}
+    places: dict[str | int, Location] = {}
     data: Any = []
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         row = [(m.group(), m.start() + 1, m.end() + 1) for m in _WORD.finditer(line)]
         line_span = Span(file, number, row[0][1], number, row[-1][2])
-        tokens = {i: Place(Span(file, number, a, number, b)) for i, (_, a, b) in enumerate(row)}
-        places[len(data)] = Place(line_span, tokens)
+        tokens = {i: Location(Span(file, number, a, number, b)) for i, (_, a, b) in enumerate(row)}
+        places[len(data)] = Location(line_span, tokens)
         data.append([token for token, _, _ in row])
     first = places[0].span
     return Source(
-        file, Place(Span(file, first.line, first.column, len(lines) + 1, 1), places), data
+        file, Location(Span(file, first.line, first.column, len(lines) + 1, 1), places), data
     )
 
 
@@ -126,18 +126,18 @@ def _launch(text: str, file: str) -> Source:
     What stands in comments is left out, nothing is run.
     """
     lines = _LineOffsets(text, file)
-    places: dict[str | int, Place] = {}
+    places: dict[str | int, Location] = {}
     data: Any = []
     found = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)
     for tokens in found:
         if not tokens:
             continue
         inside = {
-            index: Place(lines.span(start, end)) for index, (_, start, end) in enumerate(tokens)
+            index: Location(lines.span(start, end)) for index, (_, start, end) in enumerate(tokens)
         }
-        places[len(data)] = Place(lines.span(tokens[0][1], tokens[-1][2]), inside)
+        places[len(data)] = Location(lines.span(tokens[0][1], tokens[-1][2]), inside)
         data.append([token for token, _, _ in tokens])
-    return Source(file, Place(Span(file), places), data)
+    return Source(file, Location(Span(file), places), data)
 
 
 def _in_xml(text: str) -> Iterator[list[tuple[str, int, int]]]:

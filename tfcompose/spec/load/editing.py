@@ -14,7 +14,7 @@ from tfcompose.spec.load import load
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.spec.load import Path, Place
+    from tfcompose.spec.load import Location, Path
 
 
 def text_at(text: str, span: Span) -> str:
@@ -33,7 +33,7 @@ class MappingKeys:
     """The keys that stand in one mapping of a file's text, without those that ``<<`` brings."""
 
     text: str
-    mapping: Place
+    mapping: Location
 
     @property
     def own(self) -> list[str]:
@@ -120,24 +120,26 @@ def with_value(text: str, file: str, path: Path, values: Mapping[str, str | None
     shown = {key: shown.get(key, "null") for key in values}
     if not any(line.strip() and not line.lstrip().startswith("#") for line in text.splitlines()):
         return text + _block(path, shown, 0)
-    place, depth = load(text, file).places, 0
+    location, depth = load(text, file).places, 0
     while (
-        depth < len(path) and (below := place.inside.get(path[depth])) is not None and below.keys
+        depth < len(path)
+        and (below := location.inside.get(path[depth])) is not None
+        and below.keys
     ):
-        place, depth = below, depth + 1
-    keys = MappingKeys(text, place)
-    there = [key for key in shown if key in place.inside] if depth == len(path) else []
-    edits = [Edit(place.inside[key].span, shown[key]) for key in there]
+        location, depth = below, depth + 1
+    keys = MappingKeys(text, location)
+    there = [key for key in shown if key in location.inside] if depth == len(path) else []
+    edits = [Edit(location.inside[key].span, shown[key]) for key in there]
     rest = {key: value for key, value in shown.items() if key not in there}
     if depth < len(path):
         rest = {str(path[depth]): _flow(path[depth + 1 :], shown)}
     if rest and depth < len(path) and not keys.is_flow:
-        indent = place.keys[keys.own[0]].span.column - 1
-        first = place.keys[keys.own[0]].span
-        at = Span(file, first.line, 1, first.line, 1)
+        indent = location.keys[keys.own[0]].span.column - 1
+        first = location.keys[keys.own[0]].span
+        span = Span(file, first.line, 1, first.line, 1)
         if depth == 0:
             return _with_newline(text) + _block(path, shown, 0)
-        edits.append(Edit(at, _block(path[depth:], shown, indent)))
+        edits.append(Edit(span, _block(path[depth:], shown, indent)))
     elif rest:
         edits.append(keys.insertion(rest))
     result = apply_edits(text, edits)

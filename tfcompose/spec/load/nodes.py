@@ -86,10 +86,10 @@ class _Part:
     """
 
     value: Any
-    place: Place
+    location: Location
     size: int = 1
     height: int = 0
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -105,9 +105,9 @@ class _Open:
     is_root: bool
     found_before: int
     waits_for_key: bool
-    inside: dict[str | int, Place] = field(default_factory=dict)
-    keys: dict[str, Place] = field(default_factory=dict)
-    merges: tuple[tuple[Any, Place], ...] = ()
+    inside: dict[str | int, Location] = field(default_factory=dict)
+    keys: dict[str, Location] = field(default_factory=dict)
+    merges: tuple[tuple[Any, Location], ...] = ()
     size: int = 1
     height: int = 0
     key: str = ""
@@ -123,14 +123,14 @@ class _Open:
 class DocumentReader:
     """Reads the documents of one text.
 
-    ``found`` is what was wrong, ``has_nulls`` whether a value is null.
+    ``findings`` is what was wrong, ``has_nulls`` whether a value is null.
     """
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.found: list[Finding] = []
+        self.findings: list[Finding] = []
         self.has_nulls = False
-        self.documents: list[tuple[Any, Place]] = []
+        self.documents: list[tuple[Any, Location]] = []
         self._anchors: dict[str, _Part | None] = {}
         self._stack: list[_Open] = []
         self._values = 0
@@ -162,36 +162,38 @@ class DocumentReader:
         except UnicodeEncodeError as error:
             message = f"the text is not Unicode: {error.reason}"
             raise RejectedError([finding("TF001", message, Span(self.file))]) from None
-        self.found = list(dict.fromkeys(self.found))  # an alias says again what its anchor said
+        self.findings = list(
+            dict.fromkeys(self.findings)
+        )  # an alias says again what its anchor said
 
     def _begin(self, event: yaml.Event, *, single: bool) -> None:
         self._anchors = {}
         if single and self.documents:
             message = "a second document begins here; a robot is one document"
-            raise RejectedError([finding("TF002", message, self._place(event).span)])
+            raise RejectedError([finding("TF002", message, self._location_of(event).span)])
 
-    def _place(self, event: yaml.Event) -> Place:
-        return Place(_between(self.file, event.start_mark, event.end_mark))
+    def _location_of(self, event: yaml.Event) -> Location:
+        return Location(_between(self.file, event.start_mark, event.end_mark))
 
-    def _refuse(self, message: str, place: Place) -> RejectedError:
-        return RejectedError([*self.found, finding("TF008", message, place.span)])
+    def _refuse(self, message: str, location: Location) -> RejectedError:
+        return RejectedError([*self.findings, finding("TF008", message, location.span)])
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
-        place = Place(_between(self.file, event.start_mark, event.end_mark))
-        before = len(self.found)
-        value = self.value_of(event, place)
+        location = Location(_between(self.file, event.start_mark, event.end_mark))
+        before = len(self.findings)
+        value = self.value_of(event, location)
         if event.anchor:
-            self._anchors[event.anchor] = _Part(value, place, found=self.found[before:])
+            self._anchors[event.anchor] = _Part(value, location, findings=self.findings[before:])
         top = self._stack[-1] if self._stack else None
         if top is not None and top.waits_for_key:
-            del self.found[before:]
+            del self.findings[before:]
             key = value if isinstance(value, str) and event.tag in {None, "!", STR} else None
             is_merge = key == "<<" and event.implicit[0]
-            self._key(top, key, place, "a number, true, false or null", is_merge=is_merge)
+            self._key(top, key, location, "a number, true, false or null", is_merge=is_merge)
         else:
-            self._put(value, place, 1, 0)
+            self._put(value, location, 1, 0)
 
-    def value_of(self, event: yaml.ScalarEvent, place: Place) -> Any:
+    def value_of(self, event: yaml.ScalarEvent, location: Location) -> Any:
         """Return a scalar's value, and note what is wrong with it."""
         tag, text = event.tag, event.value
         try:
@@ -201,19 +203,19 @@ class DocumentReader:
                 return value
             if _FORBIDDEN.search(text):  # written as an escape
                 raise RejectedError(
-                    [finding("TF002", "a character that no text can hold", place.span)]
+                    [finding("TF002", "a character that no text can hold", location.span)]
                 )
             if tag is None or tag in {"!", STR}:
                 return text
-            return self.tagged(tag, text, place)
+            return self.read_tagged(tag, text, location)
         except OverflowError as error:
             if text.lower() in NOT_FINITE and self._is_parameter():
                 return NOT_FINITE[text.lower()]
-            self.found.append(
+            self.findings.append(
                 finding(
                     "TF007",
                     str(error),
-                    place.span,
+                    location.span,
                     help="give a finite number; only a node's params may be .inf or .nan",
                 )
             )
@@ -231,72 +233,74 @@ class DocumentReader:
                 return True
         return False
 
-    def tagged(self, tag: str, text: str, place: Place) -> Any:
+    def read_tagged(self, tag: str, text: str, location: Location) -> Any:
         """Return the value of a scalar with a tag, and note what is wrong with it."""
         if tag not in SCALAR_TAGS:
-            self._unknown_tag(tag, place)
+            self._unknown_tag(tag, location)
             return text
         try:
             value = scalar(tag, text)
         except ValueError as error:
-            self.found.append(finding("TF005", str(error), place.span, help="leave the tag out"))
+            self.findings.append(
+                finding("TF005", str(error), location.span, help="leave the tag out")
+            )
             return text
         self.has_nulls = self.has_nulls or value is None
         return value
 
-    def _unknown_tag(self, tag: str, place: Place) -> None:
+    def _unknown_tag(self, tag: str, location: Location) -> None:
         message = f"unknown tag {tag.replace(TAG, '!!')}"
-        self.found.append(
-            finding("TF005", message, place.span, help="tags are not used: leave it out")
+        self.findings.append(
+            finding("TF005", message, location.span, help="tags are not used: leave it out")
         )
 
     def _open(self, event: yaml.CollectionStartEvent, *, is_mapping: bool) -> None:
         if len(self._stack) >= DEEPEST:
-            raise self._refuse(f"nested deeper than {DEEPEST} levels", self._place(event))
+            raise self._refuse(f"nested deeper than {DEEPEST} levels", self._location_of(event))
         data: Any = {} if is_mapping else []
         self._stack.append(
-            _Open(data, event, is_mapping, not self._stack, len(self.found), is_mapping)
+            _Open(data, event, is_mapping, not self._stack, len(self.findings), is_mapping)
         )
         if event.anchor:
             self._anchors[event.anchor] = None
         if event.tag is not None and event.tag not in {"!", MAP if is_mapping else SEQ}:
-            self._unknown_tag(event.tag, self._place(event))
+            self._unknown_tag(event.tag, self._location_of(event))
 
     def _close(self, event: yaml.Event) -> None:
         done = self._stack.pop()
-        for value, place in done.merges:
-            self._inherit(done, value, place)
-        place = Place(
+        for value, location in done.merges:
+            self._inherit(done, value, location)
+        location = Location(
             _between(self.file, done.start.start_mark, event.end_mark), done.inside, done.keys
         )
         self._size += 0 if self._stack else done.size
         if done.size > MOST_VALUES or self._size > MOST_VALUES:
             raise self._refuse(
-                f"more than {MOST_VALUES:,} values once aliases are followed", place
+                f"more than {MOST_VALUES:,} values once aliases are followed", location
             )
         if done.start.anchor:
-            found = self.found[done.found_before :]
+            findings = self.findings[done.found_before :]
             self._anchors[done.start.anchor] = _Part(
-                done.data, place, done.size, done.height, found
+                done.data, location, done.size, done.height, findings
             )
         top = self._stack[-1] if self._stack else None
         if top and top.waits_for_key:
-            del self.found[done.found_before :]
-            self._key(top, None, place, "a list or a mapping")
+            del self.findings[done.found_before :]
+            self._key(top, None, location, "a list or a mapping")
         else:
-            self._put(done.data, place, done.size, done.height)
+            self._put(done.data, location, done.size, done.height)
 
-    def _inherit(self, done: _Open, value: Any, place: Place) -> None:
+    def _inherit(self, done: _Open, value: Any, location: Location) -> None:
         """Take what ``<<`` names for the keys that the mapping does not have.
 
         The first mapping that has a key wins.
         """
         steps = enumerate(value) if isinstance(value, list) else [(None, value)]
         for index, source in steps:
-            at = place if index is None else place.inside[index]
+            at = location if index is None else location.inside[index]
             if not isinstance(source, dict):
                 message = "<< takes a mapping, or a list of mappings"
-                self.found.append(finding("TF011", message, at.span))
+                self.findings.append(finding("TF011", message, at.span))
                 continue
             for key, item in source.items():
                 if key not in done.data and not done.is_aside(key):
@@ -309,7 +313,7 @@ class DocumentReader:
     def _alias(self, event: yaml.AliasEvent) -> None:
         if event.anchor not in self._anchors:
             message = f"no anchor &{event.anchor} is defined before this alias"
-            raise RejectedError([finding("TF002", message, self._place(event).span)])
+            raise RejectedError([finding("TF002", message, self._location_of(event).span)])
         part = self._anchors[event.anchor]
         if part is None or len(self._stack) + part.height > DEEPEST:
             why = (
@@ -317,31 +321,37 @@ class DocumentReader:
                 if part
                 else "an alias stands inside what it names"
             )
-            raise self._refuse(why, self._place(event))
+            raise self._refuse(why, self._location_of(event))
         top = self._stack[-1]
         if top.waits_for_key:
             key = part.value if isinstance(part.value, str) else None
-            self._key(top, key, self._place(event), "not a string")
+            self._key(top, key, self._location_of(event), "not a string")
         else:
-            self.found += part.found
-            self._put(part.value, part.place, part.size, part.height)
+            self.findings += part.findings
+            self._put(part.value, part.location, part.size, part.height)
 
     def _key(
-        self, top: _Open, key: str | None, place: Place, what: str = "", *, is_merge: bool = False
+        self,
+        top: _Open,
+        key: str | None,
+        location: Location,
+        what: str = "",
+        *,
+        is_merge: bool = False,
     ) -> None:
         """Take a key; ignore non-text, duplicate and anchor-only ones."""
         top.key, top.waits_for_key, top.is_merge, top.keeps = key or "", False, is_merge, True
         if key is None:
             message = f"a key must be a string; this one is {what}"
-            self.found.append(finding("TF004", message, place.span, help="put it in quotes"))
+            self.findings.append(finding("TF004", message, location.span, help="put it in quotes"))
             top.keeps = False
         elif not key.isascii() and key.strip() != key:
             message = (
                 "a key begins or ends with a space that YAML does not take for one, such as a"
                 " no-break space"
             )
-            self.found.append(
-                finding("TF002", message, place.span, help="replace it with an ordinary space")
+            self.findings.append(
+                finding("TF002", message, location.span, help="replace it with an ordinary space")
             )
             top.keeps = False
         elif ("{" in key or "[" in key) and (glued := _GLUED.match(key)):
@@ -351,45 +361,45 @@ class DocumentReader:
                 else f"{glued[1]} has no colon"
             )
             advice = f"write {glued[1]}: {glued[3] if glued[3][-1] in '}]' else glued[3][0] + '…'}"
-            self.found.append(finding("TF002", message, place.span, help=advice))
+            self.findings.append(finding("TF002", message, location.span, help=advice))
             top.keeps = False
         elif key in top.keys:
             note = Note("first defined here", top.keys[key].span)
-            self.found.append(
+            self.findings.append(
                 finding(
                     "TF003",
                     f"the key {key} is given twice",
-                    place.span,
+                    location.span,
                     notes=[note],
                     help="remove one of the two, or rename it",
                 )
             )
             top.keeps = False
         else:
-            top.keys[key] = place
+            top.keys[key] = location
             top.keeps = not (top.is_root and top.is_aside(key))
-        top.found_before_value = len(self.found)
+        top.found_before_value = len(self.findings)
 
-    def _put(self, value: Any, place: Place, size: int, height: int) -> None:
+    def _put(self, value: Any, location: Location, size: int, height: int) -> None:
         """Put a finished value where it belongs."""
         if not self._stack:
-            self.documents.append((value, place))
+            self.documents.append((value, location))
             return
         top = self._stack[-1]
         top.size += size
         if height >= top.height:
             top.height = height + 1
         if not top.is_mapping:
-            top.inside[len(top.data)] = place
+            top.inside[len(top.data)] = location
             top.data.append(value)
             return
         top.waits_for_key = True
         if not top.keeps:
-            del self.found[top.found_before_value :]
+            del self.findings[top.found_before_value :]
         elif top.is_merge:
-            top.merges += ((value, place),)
+            top.merges += ((value, location),)
         else:
-            top.data[top.key], top.inside[top.key] = value, place
+            top.data[top.key], top.inside[top.key] = value, location
 
 
 def _between(file: str, start: Any, end: Any) -> tuple[str, int, int, int, int]:
@@ -405,7 +415,7 @@ Path = tuple[str | int, ...]
 _NOTHING: Mapping[Any, Any] = {}
 
 
-class Place:
+class Location:
     """The place of a value; of a mapping or list also those of its keys and items.
 
     Most places are never asked for, and become a ``Span`` only then. Places do not change.
@@ -418,8 +428,8 @@ class Place:
     def __init__(
         self,
         at: Span | tuple[str, int, int, int, int],
-        inside: Mapping[Any, Place] = _NOTHING,
-        keys: Mapping[Any, Place] = _NOTHING,
+        inside: Mapping[Any, Location] = _NOTHING,
+        keys: Mapping[Any, Location] = _NOTHING,
     ) -> None:
         """``at`` is the place, or file, lines and columns of both ends, counted from 0."""
         self._at = at
@@ -436,43 +446,45 @@ class Place:
         self._at = span = Span(file, line + 1, column + 1, end_line + 1, end_column + 1)
         return span
 
-    def with_inside(self, inside: Mapping[Any, Place], keys: Mapping[Any, Place]) -> Place:
+    def with_inside(
+        self, inside: Mapping[Any, Location], keys: Mapping[Any, Location]
+    ) -> Location:
         """Return the same place with other places in it."""
-        return Place(self._at, inside, keys)
+        return Location(self._at, inside, keys)
 
-    def get(self, path: Path) -> Place | None:
+    def get(self, path: Path) -> Location | None:
         """Return the place of what is at ``path`` below, or None."""
-        place: Place | None = self
+        location: Location | None = self
         for step in path:
-            if place is None:
+            if location is None:
                 break
-            place = place.inside.get(step)
-        return place
+            location = location.inside.get(step)
+        return location
 
-    def nearest(self, path: Path) -> Place:
+    def nearest(self, path: Path) -> Location:
         """Return the place at ``path`` below, or of the nearest thing around it."""
-        place = self
+        location = self
         for step in path:
-            below = place.inside.get(step)
+            below = location.inside.get(step)
             if below is None:
                 break
-            place = below
-        return place
+            location = below
+        return location
 
-    def nearest_key(self, path: Path) -> Place | None:
+    def nearest_key(self, path: Path) -> Location | None:
         """Return the place of the last key on the way to ``path`` that there is, or None."""
-        place = self
-        key: Place | None = None
+        location = self
+        key: Location | None = None
         for step in path:
-            key = place.keys.get(step, key)
-            below = place.inside.get(step)
+            key = location.keys.get(step, key)
+            below = location.inside.get(step)
             if below is None:
                 break
-            place = below
+            location = below
         return key
 
-    def walk(self, path: Path = ()) -> Iterator[tuple[Path, Place]]:
+    def walk(self, path: Path = ()) -> Iterator[tuple[Path, Location]]:
         """Yield every value's path and place, this one's first."""
         yield path, self
-        for step, place in self.inside.items():
-            yield from place.walk((*path, step))
+        for step, location in self.inside.items():
+            yield from location.walk((*path, step))

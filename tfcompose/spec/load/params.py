@@ -28,7 +28,7 @@ class Word:
 
     text: str
     plain: bool
-    at: Span
+    span: Span
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class NodeParams:
     """
 
     name: str
-    at: Span
+    span: Span
     params: dict[str, Any]
 
 
@@ -48,7 +48,7 @@ class ParamsFile:
     """A parameter file: its nodes in the order of the file, and what is wrong with it."""
 
     nodes: list[NodeParams] = field(default_factory=list)
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
 
 def load_params(text: str, file: str) -> ParamsFile:
@@ -63,12 +63,12 @@ def load_params(text: str, file: str) -> ParamsFile:
         root = yaml.compose(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        at = (
+        span = (
             Span(file, mark.line + 1, mark.column + 1, mark.line + 1, mark.column + 2)
             if mark
             else Span(file)
         )
-        raise RejectedError([finding("TF002", error.problem or "not YAML", at)]) from None
+        raise RejectedError([finding("TF002", error.problem or "not YAML", span)]) from None
     except (yaml.YAMLError, UnicodeEncodeError) as error:
         raise RejectedError(
             [finding("TF002", f"not YAML: {type(error).__name__}", Span(file))]
@@ -98,8 +98,10 @@ def _refuse_deep(text: str, file: str) -> None:
             depth += 1
             if depth > DEEPEST:
                 mark: Any = event.start_mark
-                at = Span(file, mark.line + 1, mark.column + 1, mark.line + 1, mark.column + 2)
-                raise RejectedError([finding("TF008", f"nested deeper than {DEEPEST} levels", at)])
+                span = Span(file, mark.line + 1, mark.column + 1, mark.line + 1, mark.column + 2)
+                raise RejectedError(
+                    [finding("TF008", f"nested deeper than {DEEPEST} levels", span)]
+                )
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
 
@@ -123,9 +125,9 @@ class _ParamsReader:
         for key, value in mapping.value:
             self._bound_depth(key)
             if not isinstance(key, yaml.ScalarNode) or not isinstance(value, yaml.MappingNode):
-                at, advice = _span(self.file, key), f"/NODE: {{{PARAMETERS}: {{…}}}}"
-                self.result.found.append(
-                    finding("TF018", "this is no node with parameters", at, help=advice)
+                span, advice = _span(self.file, key), f"/NODE: {{{PARAMETERS}: {{…}}}}"
+                self.result.findings.append(
+                    finding("TF018", "this is no node with parameters", span, help=advice)
                 )
                 continue
             name = f"{above}/{key.value}" if above else key.value
@@ -152,8 +154,8 @@ class _ParamsReader:
     @contextmanager
     def _reading(self, node: yaml.Node) -> Iterator[None]:
         if id(node) in self._open:
-            at = _span(self.file, node)
-            raise RejectedError([finding("TF008", "an alias stands inside what it names", at)])
+            span = _span(self.file, node)
+            raise RejectedError([finding("TF008", "an alias stands inside what it names", span)])
         self._open.add(id(node))
         yield
         self._open.discard(id(node))
@@ -161,11 +163,13 @@ class _ParamsReader:
     def _bound_depth(self, node: yaml.Node) -> None:
         self.count += 1
         if self.count > MOST_VALUES:
-            at = _span(self.file, node)
+            span = _span(self.file, node)
             raise RejectedError(
                 [
                     finding(
-                        "TF008", f"more than {MOST_VALUES:,} values once aliases are followed", at
+                        "TF008",
+                        f"more than {MOST_VALUES:,} values once aliases are followed",
+                        span,
                     )
                 ]
             )

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Allow, Finding, RejectedError, Span, finding
-from tfcompose.spec.load.nodes import MOST_VALUES, DocumentReader, Path, Place
+from tfcompose.spec.load.nodes import MOST_VALUES, DocumentReader, Location, Path
 from tfcompose.spec.load.syntax import no_yaml
 
 if TYPE_CHECKING:
-    __all__ = ["MOST_VALUES", "Path", "Source", "Spans", "load", "path_named", "refuse_unreadable"]
+    __all__ = ["MOST_VALUES", "Path", "Source", "Spans", "find_path", "load", "refuse_unreadable"]
 
 MOST_CHARACTERS = 4_000_000
 
@@ -34,27 +34,27 @@ class Spans:
     """
 
     file: str = field(compare=False)
-    places: Place = field(compare=False)
-    found: tuple[Finding, ...] = field(default=(), compare=False, kw_only=True)
+    places: Location = field(compare=False)
+    findings: tuple[Finding, ...] = field(default=(), compare=False, kw_only=True)
     allows: tuple[Allow, ...] = field(default=(), compare=False, kw_only=True)
     replaced: dict[Path, tuple[Span, ...]] = field(
         default_factory=dict, compare=False, kw_only=True
     )
     is_variant: bool = field(default=False, compare=False, kw_only=True)
 
-    def at(self, path: Path) -> Span:
+    def span_of(self, path: Path) -> Span:
         """Return the value's place, or that of the nearest mapping or list around it."""
         return self.places.nearest(path).span
 
-    def at_key(self, path: Path) -> Span:
+    def key_span(self, path: Path) -> Span:
         """Return the place of the key, or of the nearest key around it."""
         key = self.places.nearest_key(path)
         return key.span if key else Span(self.file)
 
-    def exactly_at(self, path: Path) -> Span | None:
+    def exact_span(self, path: Path) -> Span | None:
         """Return the place of the value, or None if there is none at the path."""
-        place = self.places.get(path)
-        return place.span if place else None
+        location = self.places.get(path)
+        return location.span if location else None
 
     def has_key(self, path: Path) -> bool:
         """Return whether the last step of the path is a key that stands somewhere."""
@@ -101,7 +101,7 @@ def load(text: str, file: str) -> Source:
         raise RejectedError([no_yaml(text, file)])
     reader = DocumentReader(file)
     reader.read(text)
-    data, place = reader.documents[0] if reader.documents else (None, Place(Span(file)))
+    data, location = reader.documents[0] if reader.documents else (None, Location(Span(file)))
     if not isinstance(data, dict):
         what = (
             "a list"
@@ -112,7 +112,7 @@ def load(text: str, file: str) -> Source:
         )
         message = f"the file is {what}, not a mapping of keys and values"
         raise RejectedError(
-            [finding("TF002", message, place.span, help="a robot begins with: tfcompose: 1")]
+            [finding("TF002", message, location.span, help="a robot begins with: tfcompose: 1")]
         )
     if "spec_digest" in data and "tfcompose" not in data:
         advice = (
@@ -124,9 +124,9 @@ def load(text: str, file: str) -> Source:
         )
     return Source(
         file,
-        place,
+        location,
         data,
-        found=tuple(reader.found),
+        findings=tuple(reader.findings),
         allows=allows_in(text, file),
         has_nulls=reader.has_nulls,
     )
@@ -155,12 +155,14 @@ def refuse_unreadable(text: str, file: str, most_characters: int = MOST_CHARACTE
         )
 
 
-def path_named(named: str, at: Span) -> str:
+def find_path(named: str, span: Span) -> str:
     """Return the path of a file that is named at a place.
 
     Relative to the file there, or to the working folder.
     """
-    folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)  # --set and its like
+    folder = (
+        "" if span.file.startswith("--") else posixpath.dirname(span.file)
+    )  # --set and its like
     return posixpath.normpath(posixpath.join(folder, named))
 
 
@@ -186,9 +188,9 @@ def allows_in(text: str, file: str) -> tuple[Allow, ...]:
         match = _COMMENT.search(line) if "tfcompose:" in line else None
         if match:
             alone = not line[: match.start()].strip()
-            at = Span(file, number, match.start() + 1, number, len(line) + 1)
+            span = Span(file, number, match.start() + 1, number, len(line) + 1)
             codes = tuple(_CODE.findall(match["codes"]))
-            found.append(Allow(codes, number + alone, (match["reason"] or "").strip(), at))
+            found.append(Allow(codes, number + alone, (match["reason"] or "").strip(), span))
     return tuple(found)
 
 
@@ -196,7 +198,7 @@ def allows_in_xml(text: str, file: str) -> tuple[Allow, ...]:
     """Return the comments in an XML file's text."""
     if "tfcompose:" not in text:
         return ()
-    starts = [0, *(found.end() for found in re.finditer("\r\n|\r|\n", text))]
+    starts = [0, *(match.end() for match in re.finditer("\r\n|\r|\n", text))]
     found: list[Allow] = []
     waiting: list[int] = []  # comments that stand alone, and wait for the tag that they are about
     tag = (0, 0)  # the first and the last line of the last tag that opened
@@ -214,13 +216,15 @@ def allows_in_xml(text: str, file: str) -> tuple[Allow, ...]:
         match = _XML.fullmatch(markup["comment"])
         if match is None:
             continue
-        at = _span(file, starts, markup.start(), markup.end())
-        alone = not text[starts[at.line - 1] : markup.start()].strip()
+        span = _span(file, starts, markup.start(), markup.end())
+        alone = not text[starts[span.line - 1] : markup.start()].strip()
         if alone:
             waiting.append(len(found))
-        first, last = (at.end_line + 1, 0) if alone else tag if tag[1] == at.line else (at.line, 0)
+        first, last = (
+            (span.end_line + 1, 0) if alone else tag if tag[1] == span.line else (span.line, 0)
+        )
         reason = " ".join((match["reason"] or "").split())
-        found.append(Allow(tuple(_CODE.findall(match["codes"])), first, reason, at, last))
+        found.append(Allow(tuple(_CODE.findall(match["codes"])), first, reason, span, last))
     return tuple(found)
 
 

@@ -51,14 +51,14 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> list[Finding
             return bare
     diagnosis = next((found for known in _DIAGNOSES if (found := known(fault))), None)
     line, column = diagnosis.at if diagnosis else fault.at
-    place = Span(file, line + 1, column + 1, line + 1, column + 2)
+    span = Span(file, line + 1, column + 1, line + 1, column + 2)
     notes = []
     if fault.began and fault.began[0] != line and (diagnosis is None or diagnosis.has_beginning):
         first, left = fault.began
         notes = [Note("it began here", Span(file, first + 1, left + 1, first + 1, left + 2))]
     if diagnosis is None:
-        return [finding("TF002", message, place, notes=notes)]
-    return [finding("TF002", diagnosis.message, place, help=diagnosis.help, notes=notes)]
+        return [finding("TF002", message, span, notes=notes)]
+    return [finding("TF002", diagnosis.message, span, help=diagnosis.help, notes=notes)]
 
 
 def no_yaml(text: str, file: str) -> Finding:
@@ -130,7 +130,7 @@ def _in_braces(value: str) -> str:
     rest = _EXPRESSION.sub("", value)
     if not rest or not _ARITHMETIC.fullmatch(rest):
         return value
-    inner = _EXPRESSION.sub(lambda found: _operand(found[0][2:-1].strip()), value)
+    inner = _EXPRESSION.sub(lambda match: _operand(match[0][2:-1].strip()), value)
     return f"${{{inner}}}"
 
 
@@ -224,10 +224,10 @@ def _is_late(fault: _Fault) -> bool:
 def _word_above(fault: _Fault) -> _Diagnosis | None:
     """A lone word above a line that is indented more."""
     above = fault.above()
-    found = _LONE_WORD.fullmatch(fault.line(above)) if _is_late(fault) and above >= 0 else None
-    if not found or not fault.stopped or len(found[1]) >= _indent(fault.stopped):
+    match = _LONE_WORD.fullmatch(fault.line(above)) if _is_late(fault) and above >= 0 else None
+    if not match or not fault.stopped or len(match[1]) >= _indent(fault.stopped):
         return None
-    return _no_colon(fault.line(above), (above, len(found[1])))
+    return _no_colon(fault.line(above), (above, len(match[1])))
 
 
 def _pair_above(fault: _Fault) -> _Diagnosis | None:

@@ -109,7 +109,7 @@ class Arrivals:
     _pause_ns: int = 0
     _resumed_ns: int = 0
 
-    def arrived(self, at_ns: int, delay_ns: int | None) -> None:
+    def note_arrival(self, at_ns: int, delay_ns: int | None) -> None:
         """Note an arrival, and how old its stamp was where that is known."""
         self.count += 1
         if self.count == 1:
@@ -138,13 +138,13 @@ class Arrivals:
         is_unusual = gap_ns * sums.gaps > PAUSE * sums.gaps_ns
         return gap_ns > self.window_ns and is_unusual
 
-    def resumed(self, at_ns: int) -> None:
+    def note_resumption(self, at_ns: int) -> None:
         """Note an arrival after a pause that is no gap."""
         if self.count:
             self.count += 1
             self.last_ns = at_ns
         else:
-            self.arrived(at_ns, None)
+            self.note_arrival(at_ns, None)
 
     def timing(self, now_ns: int) -> Timing:
         """Return what was measured until ``now_ns``, of the clock of the arrivals."""

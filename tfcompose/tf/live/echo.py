@@ -66,7 +66,7 @@ def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
                 reason = f"nothing new came on {behind} for {now - last:.1f} s"
             if now - last > query.timeout_s:
                 if listened.messages:
-                    return listened.missed(reason)
+                    return listened.explain_missing(reason)
                 return NoPose(
                     f"no TF message came for {now - begun:.1f} s",
                     elsewhere=tf_elsewhere(topics(node), query.topics),
@@ -101,7 +101,7 @@ class _Listened:
             self._rejected = None
         self._clock_ns = clock_ns or self._clock_ns
 
-    def missed(self, reason: str) -> NoPose:
+    def explain_missing(self, reason: str) -> NoPose:
         """Return why there was no pose, with what explains it."""
         if beyond := sum(self.bounds.beyond.values()):
             reason += (

@@ -135,9 +135,9 @@ class EdgeStream:
         self.stamp_ns = stamp_ns
         self.delay_ns = clock_ns - stamp_ns
         if self.handover is not None and self.handover.take(self) and self.handover.is_one:
-            self.arrivals.resumed(received_ns)
+            self.arrivals.note_resumption(received_ns)
         else:
-            self.arrivals.arrived(received_ns, None if self.static else self.delay_ns)
+            self.arrivals.note_arrival(received_ns, None if self.static else self.delay_ns)
         _, _, _, _, px, py, pz, x, y, z, w = row
         is_unit = abs(x * x + y * y + z * z + w * w - 1) < DENORMALISED
         if (

@@ -70,7 +70,7 @@ class JointStates:
         sent.lists = [*others[1 - MOST_LISTS :], (names, now_ns)]
         self._sent[gid] = sent
 
-    def sent(self) -> tuple[SentJoints, ...]:
+    def sent_joints(self) -> tuple[SentJoints, ...]:
         """Return what each publisher sent, those that have left among them."""
         return tuple(
             SentJoints(

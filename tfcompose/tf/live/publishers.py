@@ -231,7 +231,7 @@ class Publishers:
             )
         )
 
-    def named(self, nodes: Collection[str], *, static: bool) -> list[bytes]:
+    def publishers_of(self, nodes: Collection[str], *, static: bool) -> list[bytes]:
         """Return the publishers that are there of these nodes, on that kind of topic."""
         there = self.present.values()
         return [

@@ -142,7 +142,7 @@ class RosFeed:
 
     def __exit__(self, *_: object) -> None:
         """Give the observers who sent joint states, and end the node."""
-        sent = tuple(sent for joints in self._joints for sent in joints.sent())
+        sent = tuple(sent for joints in self._joints for sent in joints.sent_joints())
         for observer in self._observers.values():
             observer.sent_joints = sent
         self._stack.close()

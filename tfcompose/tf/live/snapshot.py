@@ -118,7 +118,7 @@ class SensorTopics:
         for _, text in self._description.take_texts()[-1:]:
             self.moving_joints = joints_of(text)
 
-    def stamped(self) -> tuple[StampedData, ...]:
+    def stamped_data(self) -> tuple[StampedData, ...]:
         """Return what came with a header, by topic and frame."""
         return tuple(
             StampedData(
@@ -133,7 +133,7 @@ class SensorTopics:
 
     def sent_joints(self) -> tuple[SentJoints, ...]:
         """Return who sent joint states, and of which joints."""
-        return tuple(sent for joints in self._joints.values() for sent in joints.sent())
+        return tuple(sent for joints in self._joints.values() for sent in joints.sent_joints())
 
     def _end(self, subscription: HeaderSubscription) -> None:
         self._node.destroy_subscription(subscription.subscription)
@@ -290,7 +290,7 @@ class _TopicPair:
             clock_ns=self.listener.clock_ns,
             clock_moves=self._clock[1] > self._taken_at - CLOCK_STANDS_S,
             skews_s=self.listener.skews_s,
-            stamped=self.sensors.stamped(),
+            stamped=self.sensors.stamped_data(),
             moving_joints=self.sensors.moving_joints,
             sent_joints=self.sensors.sent_joints(),
         )

@@ -170,7 +170,7 @@ class TreeState:
             "",
         )
 
-    def typed(self, type_: str) -> list[TopicState]:
+    def topics_of_type(self, type_: str) -> list[TopicState]:
         """Return the topics of that type."""
         return [topic for topic in self.graph if topic.type == type_]
 

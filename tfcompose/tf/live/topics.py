@@ -21,8 +21,8 @@ from tfcompose.tf.ros.graph import (
     ids_say_who,
     own_gid,
     own_name,
+    unmapped_writers,
     writers,
-    writers_unmapped,
 )
 from tfcompose.tf.ros.node import PublicTFReader, TFSubscription, middleware
 from tfcompose.tf.ros.processes import began_at, descent, environments, origin
@@ -322,7 +322,7 @@ class TFGraph:
         """Return who publishes on the global topics now, whatever the node's remappings are."""
         changes = self._changes.count()
         if self._shown_globally is None or self._shown_globally.changes != changes:
-            self._shown_globally = _Shown(changes, self._on(writers_unmapped, GLOBAL))
+            self._shown_globally = _Shown(changes, self._on(unmapped_writers, GLOBAL))
         return self._shown_globally.publishers
 
     def _on(

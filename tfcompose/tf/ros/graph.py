@@ -139,7 +139,7 @@ def publishing_nodes(node: Node, topic: str) -> list[str]:
     return sorted({writer.node for writer in writers(node, topic)})
 
 
-def writers_unmapped(node: Node, topic: str) -> list[GraphPublisher]:
+def unmapped_writers(node: Node, topic: str) -> list[GraphPublisher]:
     """Return the same for exactly this absolute topic, whatever the node's remappings are.
 
     It is asked for by its DDS name, ``rt/…``; an rmw without DDS shows nobody.

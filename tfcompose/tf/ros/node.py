@@ -117,14 +117,14 @@ def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterato
     try:
         yield node
     finally:
-        with ended_unless_done(LEAVE_S):
+        with end_unless_done(LEAVE_S):
             node.destroy_node()
             context.shutdown()
             context.destroy()
 
 
 @contextmanager
-def ended_unless_done(seconds: float) -> Iterator[None]:
+def end_unless_done(seconds: float) -> Iterator[None]:
     """End this process with code 1 if the block takes longer.
 
     Fast DDS 2.14 can wait for itself when several processes leave at once (one time in a hundred,
@@ -290,7 +290,7 @@ class MessageSource(ABC):
         """
         found: list[Received] = []
         while len(found) < DEEP and self._take_one():
-            found.append(self._received())
+            found.append(self._receive())
         return found
 
     @abstractmethod
@@ -301,7 +301,7 @@ class MessageSource(ABC):
     def add_to(self, wait_set: Any) -> tuple[str, int]:
         """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
 
-    def _received(self) -> Received:
+    def _receive(self) -> Received:
         info = self._info
         gid = None if (raw := bytes(info.gid)) == _NO_GID else raw
         return Received(

@@ -61,18 +61,18 @@ class LookupAction:
         if not self.client.server_is_ready():
             return f"no buffer server offers {self._name}"
         sent = self.client.send_goal_async(goal)
-        if not _done(sent, end):
+        if not _wait_until_done(sent, end):
             return f"the buffer server {self._name} did not take the query in {timeout_s:g} s"
         handle = sent.result()
         if not handle.accepted:
             return f"the buffer server {self._name} refused the query"
         answer = handle.get_result_async()
-        if not _done(answer, end):
+        if not _wait_until_done(answer, end):
             return f"the buffer server {self._name} did not answer in {timeout_s:g} s"
         return answer.result().result
 
 
-def _done(future: Any, end: float) -> bool:
+def _wait_until_done(future: Any, end: float) -> bool:
     """Wait until the future is done; return False where the time is over before."""
     done = Event()
     future.add_done_callback(lambda _: done.set())

@@ -108,12 +108,12 @@ def publisher_of(token: str) -> TokenOfPublisher | None:
         return None
     namespace, node, topic, kind, qos = (parts[at].replace("%", "/") for at in (7, 8, 9, 10, 12))
     reliability, _, rest = qos.partition(":")
-    found = _TYPE.fullmatch(kind)
+    match = _TYPE.fullmatch(kind)
     return TokenOfPublisher(
         gid_of_token(token),
         f"{namespace.rstrip('/')}/{node}",
         topic,
-        type=f"{found[1].replace('::', '/')}/{found[2]}" if found else kind,
+        type=f"{match[1].replace('::', '/')}/{match[2]}" if match else kind,
         durability="transient_local" if rest.partition(":")[0] == _TRANSIENT_LOCAL else "volatile",
         reliability="best_effort" if reliability == _BEST_EFFORT else "reliable",
     )

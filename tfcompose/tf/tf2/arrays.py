@@ -96,7 +96,7 @@ def lookup_many(
 ) -> Trajectory:
     """Return what ``Buffer.lookup_many`` does."""
     times = stamps_of(stamps)
-    with buffer.locked():
+    with buffer.lock():
         if not times.all():
             times = np.where(times == 0, buffer.lookup(target, source)[1], times)
         chain = buffer.chain_for_all_times(target, source)

@@ -152,7 +152,7 @@ class TimeCache:
         x, y, z, qx, qy, qz, qw = self.poses[7 * index : 7 * index + 7 or None]
         return x, y, z, qx, qy, qz, qw
 
-    def at(self, stamp_ns: int) -> PoseTuple | None:
+    def pose_at(self, stamp_ns: int) -> PoseTuple | None:
         """Return the pose at that time (0: newest), interpolated between two samples.
 
         Between samples of two parents the older holds. None: there is no sample before, or none
@@ -261,13 +261,13 @@ class PoseChain:
             None if self.moving else unit(self.links[0][1] or IDENTITY) if self.links else IDENTITY
         )
 
-    def at(self, stamp_ns: int) -> PoseTuple | None:
+    def pose_at(self, stamp_ns: int) -> PoseTuple | None:
         """Return the source's pose in the target at that time, None if an edge has none."""
         if self.fixed is not None:
             return self.fixed
         pose = None
         for cache, fixed, backwards in self.links:
-            link = fixed if cache is None else cache.at(stamp_ns)
+            link = fixed if cache is None else cache.pose_at(stamp_ns)
             if link is None:
                 return None
             if pose is None:
@@ -308,7 +308,7 @@ def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> P
     """
     up, down, tops = _meet(caches, target, source, lambda cache: cache.parent)
     if tops:
-        raise exceptions.not_connected(caches, target, source, tops)
+        raise exceptions.connectivity_error(caches, target, source, tops)
     return PoseChain(up, down)
 
 
@@ -329,7 +329,7 @@ def chain_at(
         if top in caches:
             raise outside(caches[top], stamp_ns)
     if tops:
-        raise exceptions.not_connected(caches, target, source, tops)
+        raise exceptions.connectivity_error(caches, target, source, tops)
     return PoseChain(up, down)
 
 

@@ -174,7 +174,7 @@ def unusable_name(frame: str, argument: str) -> InvalidArgumentException:
     )
 
 
-def not_connected(
+def connectivity_error(
     known: Collection[str], target: str, source: str, tops: Sequence[str]
 ) -> ConnectivityException:
     """Return the exception for two frames whose ways up end at two ``tops``."""

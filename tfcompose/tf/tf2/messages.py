@@ -335,7 +335,7 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
     from tfcompose.tf.tf2.arrays import transform_cloud  # noqa: PLC0415 (numpy is optional)
 
     moved = transform_cloud(cloud, pose_of(transform))
-    moved.header = _copied_with_header(cloud.header, cloud.header.stamp)
+    moved.header = _copy_with_header(cloud.header, cloud.header.stamp)
     moved.header.frame_id = getattr(transform, "header", cloud.header).frame_id
     return moved
 
@@ -371,7 +371,7 @@ def pose_of(transform: Any) -> PoseTuple:
     return unit((to.x, to.y, to.z, *(quat if any(quat) else IDENTITY[3:])))
 
 
-def _copied_with_header(headed: Any, stamp: Any) -> Any:
+def _copy_with_header(headed: Any, stamp: Any) -> Any:
     """Return a copy of a message or header whose stamp is given.
 
     Rclpy's ``Time`` cannot be copied, nor changed.
@@ -381,7 +381,7 @@ def _copied_with_header(headed: Any, stamp: Any) -> Any:
 
 def _with_header_of(message: Any, transform: Any) -> Any:
     """Return a copy of the message with the frame and the time of the transform."""
-    copied = _copied_with_header(message, message.header.stamp)
+    copied = _copy_with_header(message, message.header.stamp)
     copied.header.frame_id, stamp_ns = (
         transform.header.frame_id,
         nanoseconds(transform.header.stamp),

@@ -167,7 +167,7 @@ class PoseBuffer:
         if outcome == "old":
             return Rejection.OLD
         if outcome == "changed":
-            self._changed(cache)
+            self._forget_chains(cache)
         cache.authority = authority
         return None
 
@@ -231,7 +231,7 @@ class PoseBuffer:
             return str(error)
         return ""
 
-    def locked(self) -> RLock:
+    def lock(self) -> RLock:
         """Return a context in which nothing is taken, by any thread."""
         return self._lock
 
@@ -259,7 +259,7 @@ class PoseBuffer:
                 return self._pose_at(target, source, at_ns), at_ns
             if chain.fixed is not None:
                 return chain.fixed, stamp_ns
-            pose = chain.at(at_ns)
+            pose = chain.pose_at(at_ns)
             if pose is None:
                 try:
                     pose = self._pose_at(target, source, at_ns)
@@ -286,7 +286,7 @@ class PoseBuffer:
 
         In a loop of frames the other way round may be the one.
         """
-        pose = chain_at(self._caches, target, source, stamp_ns).at(stamp_ns)
+        pose = chain_at(self._caches, target, source, stamp_ns).pose_at(stamp_ns)
         if pose is None:
             raise ExtrapolationException(
                 f"{source} has no pose in {target} at {exceptions.seconds(stamp_ns)}"
@@ -322,7 +322,7 @@ class PoseBuffer:
         cache = self._caches[child] = TimeCache(child, static=static)
         return cache
 
-    def _changed(self, cache: TimeCache) -> None:
+    def _forget_chains(self, cache: TimeCache) -> None:
         """Forget the chains, since an edge is new, or has another fixed pose or parent."""
         self._chains.clear()
         (self._mixed.add if cache.mixed else self._mixed.discard)(cache.child)

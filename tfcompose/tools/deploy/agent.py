@@ -296,7 +296,7 @@ class Agent:
         Raises:
             HostError: if it does not.
         """
-        folder = self._launched_from()
+        folder = self._launched_folder()
         if folder is None:
             raise HostError("its launcher is not a release's")
         self.running = self.base / "releases" / release
@@ -540,7 +540,7 @@ class Agent:
             if not name.startswith("venv/")
         }
 
-    def _launched_from(self) -> Path | None:
+    def _launched_folder(self) -> Path | None:
         """Return the folder of the plan that the running launcher was started with.
 
         It is given files below it.
@@ -556,7 +556,7 @@ class Agent:
         return plans[0].parent if plans and plans[0].is_relative_to(self.base) else None
 
     def _prune(self) -> None:
-        launched = self._launched_from()
+        launched = self._launched_folder()
         kept = {
             self._release("current"),
             self._release("previous"),

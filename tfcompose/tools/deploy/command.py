@@ -78,7 +78,7 @@ def run(arguments: Namespace) -> int:
     """Deploy; exit code 0, 1 on failure or a difference with --check, 2 if unreadable."""
     from importlib.util import find_spec
 
-    from tfcompose.cli.compiling import compiled_without_errors
+    from tfcompose.cli.compiling import compile_without_errors
     from tfcompose.cli.plans import in_folder, is_plan
     from tfcompose.compiler.emit.plan import plan_of
     from tfcompose.foundation.findings import RejectedError
@@ -90,14 +90,14 @@ def run(arguments: Namespace) -> int:
     wheels = Path(arguments.wheels) if arguments.wheels else None
     if wheels and not any(wheels.glob("*.whl")):
         fail(f"there is no wheel in {wheels}", UNREADABLE)
-    robot, _ = compiled_without_errors(arguments.file, arguments)
+    robot, _ = compile_without_errors(arguments.file, arguments)
     import asyncio
 
     from tfcompose.tools.deploy.release import pack_release
     from tfcompose.tools.deploy.rollout import target_of
 
     try:
-        places = {name: host.at for name, host in robot.hosts.items()}
+        places = {name: host.span for name, host in robot.hosts.items()}
         target = target_of(
             plan_of(robot.with_final_names()),
             arguments.hosts,
@@ -119,8 +119,8 @@ async def _deploy(target: DeployTarget, release: Release | None, arguments: Name
     async with reach_hosts(
         target, has_wheels=bool(release and release.has_wheels), report=_report
     ) as rollout:
-        if found := await rollout.examine():
-            print_findings(found, sys.stderr)
+        if findings := await rollout.examine():
+            print_findings(findings, sys.stderr)
             return FAILED
         if not arguments.check:
             await rollout.lock()
@@ -128,8 +128,8 @@ async def _deploy(target: DeployTarget, release: Release | None, arguments: Name
             await rollout.plan_return()
         else:
             await rollout.compare(release)
-        if found := rollout.strangers():
-            print_findings(found, sys.stderr)
+        if findings := rollout.strangers():
+            print_findings(findings, sys.stderr)
             return FAILED
         if arguments.diff and release is not None:
             for line in await rollout.difference():
@@ -157,7 +157,7 @@ def _report_unchanged(rollout: Rollout) -> int:
 
     Exit code 1 in that case.
     """
-    print(f"nothing to change: {rollout.described()}")
-    found = rollout.not_live()
-    print_findings(found, sys.stderr)
-    return FAILED if found else 0
+    print(f"nothing to change: {rollout.describe()}")
+    findings = rollout.not_live()
+    print_findings(findings, sys.stderr)
+    return FAILED if findings else 0

@@ -85,17 +85,17 @@ class RefusedError(Exception):
 
 
 class ConnectedHost:
-    """A host that is connected. ``at`` is its place in the robot file."""
+    """A host that is connected. ``span`` is its place in the robot file."""
 
     def __init__(
         self,
         name: str,
         connection: asyncssh.SSHClientConnection,
         process: asyncssh.SSHClientProcess[bytes],
-        at: Span | None,
+        span: Span | None,
     ) -> None:
         self.name = name
-        self.at = at
+        self.span = span
         self._connection = connection
         self._process = process
         self._order = asyncio.Lock()
@@ -166,7 +166,7 @@ class ConnectedHost:
 
 
 async def connect_host(
-    name: str, host: PlanHost, settings: Settings, at: Span | None
+    name: str, host: PlanHost, settings: Settings, span: Span | None
 ) -> ConnectedHost | Finding:
     """Return the host, with its agent, or why it cannot be reached."""
     user, _, address = host.ssh.rpartition("@")
@@ -186,18 +186,20 @@ async def connect_host(
         )
     except asyncssh.HostKeyNotVerifiable as error:
         advice = f"log in once, and compare its key: ssh {_in_words(host)}"
-        return _unreachable(name, f"its key is not trusted ({error})", at, advice)
+        return _unreachable(name, f"its key is not trusted ({error})", span, advice)
     except asyncssh.PermissionDenied:
         advice = f"allow your key there: ssh-copy-id {_in_words(host)}"
-        return _unreachable(name, f"{host.ssh} does not let you in without a password", at, advice)
+        return _unreachable(
+            name, f"{host.ssh} does not let you in without a password", span, advice
+        )
     except asyncio.TimeoutError:
-        return _unreachable(name, f"{host.ssh} does not answer within {CONNECT_S:g} s", at)
+        return _unreachable(name, f"{host.ssh} does not answer within {CONNECT_S:g} s", span)
     except (OSError, asyncssh.Error) as error:
         return _unreachable(
             name,
             f"{host.ssh}:"
             f" {error.strerror if isinstance(error, OSError) and error.strerror else error}",
-            at,
+            span,
         )
     python = settings.python
     try:
@@ -205,14 +207,17 @@ async def connect_host(
             agent_command(python), encoding=None, window=2**21, max_pktsize=2**15
         )
         process.stdin.write(agent_input(settings))
-        there = ConnectedHost(name, connection, process, at)
+        there = ConnectedHost(name, connection, process, span)
         await there.ask("clock", 2 * CONNECT_S)
     except (OSError, asyncssh.Error, LostError, RefusedError) as error:
         why = await _stderr_of(process) or str(error)
         connection.close()
         message = f"{name} cannot run {python}: {why}"
         return finding(
-            "TF914", message, at, help=f"hosts: {{{name}: {{python: FILE}}}}, Python 3.10 or newer"
+            "TF914",
+            message,
+            span,
+            help=f"hosts: {{{name}: {{python: FILE}}}}, Python 3.10 or newer",
         )
     return there
 
@@ -230,5 +235,5 @@ def _in_words(host: PlanHost) -> str:
     return f"-p {host.port} {host.ssh}" if host.port is not None else host.ssh
 
 
-def _unreachable(name: str, why: str, at: Span | None, advice: str = "") -> Finding:
-    return finding("TF913", f"{name} cannot be reached: {why}", at, help=advice)
+def _unreachable(name: str, why: str, span: Span | None, advice: str = "") -> Finding:
+    return finding("TF913", f"{name} cannot be reached: {why}", span, help=advice)

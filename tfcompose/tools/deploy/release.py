@@ -148,7 +148,7 @@ def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
     for part in robot.parts:
         for asset in assets(part.robot):
             draft.address(asset)
-    files = _with_named(draft.places)
+    files = _add_named_files(draft.places)
     places = _places(files, draft.places)
     target = _Packing(top=top, folder=".", places={file: places[file] for file in draft.places})
     texts = {file.path: file.text for file in emit(robot, target)}
@@ -162,7 +162,7 @@ def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
     return Release(plan, texts, copies)
 
 
-def _with_named(named: Mapping[str, str]) -> list[str]:
+def _add_named_files(named: Mapping[str, str]) -> list[str]:
     """Return the files, those in named folders, and those that they name.
 
     Raises:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.foundation.text import duration, listed, plural
+from tfcompose.foundation.text import duration, list_names, plural
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import hosts_of, share_of, without_computer
 from tfcompose.tools.deploy.agent import UNIT
@@ -95,7 +95,7 @@ class Share:
         assert self.release is not None, "it is made before anything is compared"  # noqa: S101
         return self.release
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return what the host has, in words."""
         probe = self.probe
         version = f"tfcompose {probe['tfcompose']}" if probe["tfcompose"] else "no tfcompose"
@@ -147,26 +147,26 @@ class Rollout:
     async def examine(self) -> list[Finding]:
         """Return what is in the way on the hosts, and apart between them."""
         offsets = await self._by_name(lambda share: share.host.clock_offset_s())
-        found = [finding for share in self.shares for finding in self._unfit(share)]
-        found += _clocks_apart(offsets, self.target)
-        found += _settings_apart(self.shares, self.target)
+        findings = [finding for share in self.shares for finding in self._unfit(share)]
+        findings += _clocks_apart(offsets, self.target)
+        findings += _settings_apart(self.shares, self.target)
         for share in self.shares:
             self.report(
-                f"{share.name}: {share.described()}, clock {offsets[share.name] * 1000:+.1f} ms"
+                f"{share.name}: {share.describe()}, clock {offsets[share.name] * 1000:+.1f} ms"
             )
-        return found
+        return findings
 
     def _unfit(self, share: Share) -> Iterable[Finding]:
-        probe, at, name = share.probe, share.host.at, share.name
+        probe, span, name = share.probe, share.host.span, share.name
         for problem in probe["problems"]:
-            yield finding("TF914", f"{name} cannot run the robot: {problem}", at)
+            yield finding("TF914", f"{name} cannot run the robot: {problem}", span)
         if probe["tfcompose"] is None and not probe["problems"] and not share.unit.has_wheels:
             advice = (
                 f"install it there, name its Python, hosts: {{{name}: {{python: FILE}}}}, or give"
                 " --wheels FOLDER"
             )
             yield finding(
-                "TF914", f"{name} has no tfcompose for {probe['executable']}", at, help=advice
+                "TF914", f"{name} has no tfcompose for {probe['executable']}", span, help=advice
             )
 
     async def compare(self, release: Release) -> None:
@@ -220,7 +220,7 @@ class Rollout:
                 "TF914",
                 f"{self.target.plan.robot} runs on {share.name} already, and not as"
                 f" {share.unit.file}: pid {share.state['stranger']}",
-                share.host.at,
+                share.host.span,
                 help=f"there: tfcompose down --robot {share.unit.name}",
             )
             for share in self.shares
@@ -235,9 +235,9 @@ class Rollout:
         found = {share.name: share.changes() for share in self.shares}
         return {name: lines for name, lines in found.items() if lines}
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return which releases run where, in words."""
-        return listed(
+        return list_names(
             [f"{share.name} runs release {share.state['release']}" for share in self.shares],
             NAMED_AT_MOST,
         )
@@ -278,7 +278,7 @@ class Rollout:
             if answer["holder"]:
                 message = f"{answer['holder']} is deploying to {share.name}"
                 raise RejectedError(
-                    [finding("TF915", message, share.host.at, help="wait until that has ended")]
+                    [finding("TF915", message, share.host.span, help="wait until that has ended")]
                 )
 
     async def send(self) -> None:
@@ -316,12 +316,12 @@ class Rollout:
 
     async def _rehearse(self, share: Share) -> list[Finding]:
         found = await self._ask(share, "rehearse", release=share.wanted.name, host=share.name)
-        place = share.host.at
+        span = share.host.span
         return [
             finding(
                 finding_there["code"],
                 f"{share.name}: {finding_there['message']}",
-                place,
+                span,
                 help=finding_there["help"],
             )
             for finding_there in found
@@ -380,7 +380,7 @@ class Rollout:
                 problem for some in map(self._missing, self.shares, states) for problem in some
             ]
             if not missing:
-                hosts = listed([share.name for share in self.shares], NAMED_AT_MOST)
+                hosts = list_names([share.name for share in self.shares], NAMED_AT_MOST)
                 return f"{plural(len(self._edges()), 'edge')} live on {hosts}"
             if left <= seconds or any(state["failed"] for state in states):
                 raise RejectedError(missing)
@@ -399,15 +399,17 @@ class Rollout:
             RejectedError: if a host has none.
         """
         states = await self._by_name(lambda share: share.host.ask("state"))
-        found = []
+        findings = []
         for share in self.shares:
             share.state, share.goal = states[share.name], states[share.name]["previous"] or ""
             if not share.goal:
-                found.append(
-                    finding("TF912", f"{share.name} has no release before this one", share.host.at)
+                findings.append(
+                    finding(
+                        "TF912", f"{share.name} has no release before this one", share.host.span
+                    )
                 )
-        if found:
-            raise RejectedError(found)
+        if findings:
+            raise RejectedError(findings)
 
     def _edges(self) -> list[str]:
         plan, names = self.target.plan, {share.name for share in self.shares}
@@ -419,11 +421,11 @@ class Rollout:
 
         For some of the hosts, of theirs.
         """
-        plan, robot, at = self.target.plan, state["robot"], share.host.at
+        plan, robot, span = self.target.plan, state["robot"], share.host.span
         notes = [Note(line) for line in state["lines"]]
         if robot is None or state["failed"]:
             what = "keeps exiting" if state["failed"] else "does not run"
-            return [finding("TF917", f"{plan.robot} {what} on {share.name}", at, notes=notes)]
+            return [finding("TF917", f"{plan.robot} {what} on {share.name}", span, notes=notes)]
         expected = set(self._edges())
         missing = [
             edge
@@ -435,7 +437,7 @@ class Rollout:
             for process in robot["processes"]
             if process["kind"] != "external" and (process["failed"] or not process["ready"])
         ]
-        found = []
+        findings = []
         if missing:
             hosts = {edge.name: plan.process(edge.owner).host or edge.owner for edge in plan.edges}
             named = list(missing)
@@ -443,16 +445,18 @@ class Rollout:
                 if hosts[edge] != share.name:
                     named[index] = f"{edge} (of {hosts[edge]})"
             message = f"{len(missing)} of {len(expected)} edges are not live on {share.name}: "
-            found.append(finding("TF917", message + listed(named, NAMED_AT_MOST), at))
+            findings.append(finding("TF917", message + list_names(named, NAMED_AT_MOST), span))
         if late:
             named = [
                 f"{process['name']} ({process['detail'] or process['waits'] or process['state']})"
                 for process in late
             ]
-            found.append(
-                finding("TF917", f"not ready on {share.name}: {listed(named, NAMED_AT_MOST)}", at)
+            findings.append(
+                finding(
+                    "TF917", f"not ready on {share.name}: {list_names(named, NAMED_AT_MOST)}", span
+                )
             )
-        return found
+        return findings
 
     async def _back(self, shares: Sequence[Share]) -> list[Note]:
         """Let these hosts go back, whatever becomes of the others, and return what each says."""
@@ -489,11 +493,11 @@ class Rollout:
             return await share.host.ask(request, **arguments)
         except LostError as error:
             raise RejectedError(
-                [finding("TF917", f"{share.name} {error}", share.host.at)]
+                [finding("TF917", f"{share.name} {error}", share.host.span)]
             ) from None
         except RefusedError as error:
             raise RejectedError(
-                [finding("TF917", f"{share.name}: {error}", share.host.at)]
+                [finding("TF917", f"{share.name}: {error}", share.host.span)]
             ) from None
 
     async def _all(
@@ -507,14 +511,14 @@ class Rollout:
         answers = await asyncio.gather(
             *(map(do, self.shares if shares is None else shares)), return_exceptions=True
         )
-        found: list[Finding] = []
+        findings: list[Finding] = []
         for answer in answers:
             if isinstance(answer, RejectedError):
-                found += answer.findings
+                findings += answer.findings
             elif isinstance(answer, BaseException):
                 raise answer
-        if found:
-            raise RejectedError(found)
+        if findings:
+            raise RejectedError(findings)
         return answers
 
     async def _by_name(self, do: Callable[[Share], Awaitable[Any]]) -> dict[str, Any]:
@@ -523,7 +527,7 @@ class Rollout:
                 return await do(share)
             except (LostError, RefusedError) as error:
                 raise RejectedError(
-                    [finding("TF913", f"{share.name} {error}", share.host.at)]
+                    [finding("TF913", f"{share.name} {error}", share.host.span)]
                 ) from None
 
         answers = await self._all(safe)
@@ -534,7 +538,7 @@ async def _probe(host: ConnectedHost) -> dict[str, Any]:
     try:
         probe: dict[str, Any] = await host.ask("probe")
     except (LostError, RefusedError) as error:
-        raise RejectedError([finding("TF913", f"{host.name} {error}", host.at)]) from None
+        raise RejectedError([finding("TF913", f"{host.name} {error}", host.span)]) from None
     return probe
 
 
@@ -555,22 +559,22 @@ def target_of(
             [finding("TF912", f"{plan.robot} has no hosts to deploy to", None, help=advice)]
         )
     if nowhere := without_computer(plan):
-        message = f"{listed(nowhere, NAMED_AT_MOST)} would run on no host"
+        message = f"{list_names(nowhere, NAMED_AT_MOST)} would run on no host"
         advice = (
             "processes without a host run where static does: processes: {static: {host:"
             f" {next(iter(plan.hosts))}}}}}"
         )
         raise RejectedError([finding("TF912", message, None, help=advice)])
-    found = []
+    findings = []
     for name in names:
         if name not in used:
             known = f"there is {', '.join(used)}"
             message = f"no process of {plan.robot} runs on a host {name}"
-            found.append(finding("TF819", message, None, help=did_you_mean(name, used, known)))
+            findings.append(finding("TF819", message, None, help=did_you_mean(name, used, known)))
     shares = [share_of(plan, name, "") for name in used]
-    found += [share for share in shares if isinstance(share, Finding)]
-    if found:
-        raise RejectedError(found)
+    findings += [share for share in shares if isinstance(share, Finding)]
+    if findings:
+        raise RejectedError(findings)
     chosen = {name: plan.hosts[name] for name in used if not names or name in names}
     return DeployTarget(plan, chosen, places, is_complete=len(chosen) == len(used), **options)
 
@@ -633,7 +637,7 @@ def _settings_apart(shares: Sequence[Share], target: DeployTarget) -> Iterable[F
         if kept := [name for name, share in reaches.items() if share == reach]:
             message = (
                 f"discovery: {reach} keeps nodes from those of other hosts on"
-                f" {listed(kept, NAMED_AT_MOST)}"
+                f" {list_names(kept, NAMED_AT_MOST)}"
             )
             yield finding("TF916", message, None, help="ros: {discovery: subnet}")
 
@@ -657,8 +661,8 @@ async def reach_hosts(
     done = await asyncio.gather(*connecting)
     hosts = [result for result in done if isinstance(result, ConnectedHost)]
     try:
-        if found := [result for result in done if isinstance(result, Finding)]:
-            raise RejectedError(found)
+        if findings := [result for result in done if isinstance(result, Finding)]:
+            raise RejectedError(findings)
         rollout = Rollout(target, [], report)
         for there, probe in zip(
             hosts, await asyncio.gather(*(_probe(host) for host in hosts)), strict=True

@@ -14,7 +14,7 @@ from tfcompose.cli.documentation import topic_groups
 from tfcompose.cli.parser import all_groups, parser_of
 from tfcompose.cli.schemas import languages_with_reference
 from tfcompose.foundation.catalogue import CATALOGUE, FAMILIES
-from tfcompose.foundation.tool import installed
+from tfcompose.foundation.tool import installed_tools
 from tfcompose.model.files import File
 from tfcompose.tools.docs.addresses import Addresses
 from tfcompose.tools.docs.builder import FAMILY_TITLES, Builder
@@ -135,5 +135,5 @@ def _pages_of(groups: Sequence[PageGroup]) -> Iterator[SitePage]:
 
 def _tools_of_codes() -> dict[str, str]:
     """Return the codes with the tools that bring them; empty for the core."""
-    of_tools = {code: tool.name for tool in installed().tools for code in tool.code_names()}
+    of_tools = {code: tool.name for tool in installed_tools().tools for code in tool.code_names()}
     return {code: of_tools.get(code, "") for code in CATALOGUE}

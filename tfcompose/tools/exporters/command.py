@@ -118,7 +118,7 @@ def run(arguments: Namespace) -> int:
         read_built_plan,
         refuse_variant,
     )
-    from tfcompose.launcher.fence import not_remapped
+    from tfcompose.launcher.fence import find_not_remapped
 
     arguments.file = in_folder(arguments.file)
     if arguments.kind == "k8s" and not arguments.image:
@@ -140,7 +140,7 @@ def run(arguments: Namespace) -> int:
             "a strict plan needs a guard, and a launch file has none: export with --set"
             " guard.mode=watch"
         )
-    if plan.guard.mode == "strict" and (missed := not_remapped(plan)):
+    if plan.guard.mode == "strict" and (missed := find_not_remapped(plan)):
         reject(missed)
     _write(plan, file, arguments)
     return 0
@@ -152,7 +152,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
 
     folder = Path(arguments.output or file.parent) / arguments.kind
     try:
-        files, differences = _exported(plan, file, folder, arguments)
+        files, differences = _export(plan, file, folder, arguments)
         write_all(folder, files)
     except RejectedError as error:
         reject(error.findings, UNREADABLE)
@@ -169,7 +169,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
         print(f"differs from tfcompose up: {line}")
 
 
-def _exported(
+def _export(
     plan: Plan, file: Path, folder: Path, arguments: Namespace
 ) -> tuple[tuple[File, ...], list[str]]:
     """Return the files, and what is not as with ``up``."""

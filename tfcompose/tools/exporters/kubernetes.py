@@ -24,7 +24,7 @@ from tfcompose.tools.exporters.supervisors import (
     after,
     command_of,
     distinct,
-    exported_of,
+    exported_processes,
     gaps_of,
     outside_of,
     plain_name,
@@ -95,7 +95,7 @@ def kubernetes(
     """
     robot = cluster_name(plan.robot)
     names = plain_names(plan, lambda name: cluster_name(f"{robot}-{name}"))
-    exported = exported_of(plan)
+    exported = exported_processes(plan)
     manifests = {"service": _service(robot)}
     if not cluster.folder:
         manifests["plan"] = _config_map(robot, texts)
@@ -218,7 +218,7 @@ def _pod(
     common = {
         "image": cluster.image,
         "env": [
-            {"name": name, "value": _kept(value)} for name, value in _environment(plan).items()
+            {"name": name, "value": _escape(value)} for name, value in _environment(plan).items()
         ],
         "workingDir": INSIDE,
         "volumeMounts": [{"name": "plan", "mountPath": INSIDE, "readOnly": True}],
@@ -234,7 +234,7 @@ def _pod(
     container = {
         "name": "process",
         **common,
-        "args": [_kept(argument) for argument in command],
+        "args": [_escape(argument) for argument in command],
         **_probes(plan, process),
         **_settings(exported, "container"),
     }
@@ -273,7 +273,7 @@ def _digest(plan: Plan, process: PlanProcess, texts: Mapping[str, str]) -> str:
     Its part of the plan, and the files that it reads.
     """
     files = [texts[path] for path in files_of(plan, process) if path != _PLAN]
-    data = msgspec.json.encode([plan.started_with(process), files])
+    data = msgspec.json.encode([plan.start_settings(process), files])
     return hashlib.sha256(data).hexdigest()[:16]
 
 
@@ -313,6 +313,6 @@ def _volume(
     return {"configMap": {"name": f"{robot}-plan", "items": items}}
 
 
-def _kept(text: str) -> str:
+def _escape(text: str) -> str:
     """Return the text as Kubernetes reads it back: it fills in ``$(NAME)`` itself."""
     return text.replace("$(", "$$(")

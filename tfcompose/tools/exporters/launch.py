@@ -184,9 +184,7 @@ def _text(
 
     ``named`` are actions that others refer to, by their variables' names.
     """
-    body = "".join(
-        f"{line}\n" for name, action in named.items() for line in _assigned(name, action)
-    )
+    body = "".join(f"{line}\n" for name, action in named.items() for line in _assign(name, action))
     body += "    return LaunchDescription([\n"
     body += (
         "".join(f"{line}\n" for action in actions for line in action.lines(" " * 8, ","))
@@ -241,7 +239,7 @@ def _in_double_quotes(text: str) -> str:
     return "".join(lines)
 
 
-def _assigned(name: str, action: CodeBlock) -> Iterator[str]:
+def _assign(name: str, action: CodeBlock) -> Iterator[str]:
     return CodeBlock(f"{name} = {action.begin}", action.parts, action.end).lines("    ")
 
 
@@ -281,13 +279,13 @@ class _Export:
             names = static_names(plan)
             yield from (
                 _state_publisher(plan),
-                *(_fixed(plan, edge, names[edge.child]) for edge in stock),
+                *(_fixed_actions(plan, edge, names[edge.child]) for edge in stock),
             )
             self.gaps.append(
                 f"robot_description is {STOCK_DESCRIPTION}, in which edges of other owners are"
                 " floating joints"
             )
-        for name in self._awaited(stock):
+        for name in self._awaited_processes(stock):
             self._variables[name] = _variable_name(name, self._variables.values())
         for process in self.processes:
             if process.kind == "guard":
@@ -302,7 +300,7 @@ class _Export:
             self.gaps += self._unlike(process)
             if self._comes_with_container(process):
                 continue
-            action = self._started(process)
+            action = self._start(process)
             if process.name in self._variables:
                 self.named[self._variables[process.name]] = action
                 action = CodeBlock(self._variables[process.name], (), "")
@@ -342,7 +340,7 @@ class _Export:
             and self._delays_s[process.name] == self._delays_s[container.name]
         )
 
-    def _awaited(self, stock: list[PlanEdge] | None) -> list[str]:
+    def _awaited_processes(self, stock: list[PlanEdge] | None) -> list[str]:
         """Return the processes for whose end others wait and which are actions of their own."""
         own = set() if stock is None else OWN_KINDS
         names = {
@@ -403,7 +401,7 @@ class _Export:
                 f" {', '.join(loads)}"
             )
 
-    def _started(self, process: PlanProcess) -> CodeBlock:
+    def _start(self, process: PlanProcess) -> CodeBlock:
         if process.component:
             container = self.known[process.component.container].nodes[0]
             components = items([self._component(process)], "composable_node_descriptions")
@@ -414,11 +412,11 @@ class _Export:
                 *self._condition(process),
             )
         if _is_launch(process):
-            return self._included(process)
+            return self._include(process)
         if _is_node(process):
             return self._node(process, [*self._settings(process), *self._condition(process)])
         if _is_command(process):
-            argv = self._filled(process, process.argv)
+            argv = self._fill(process, process.argv)
             for index, text in self._texts_of(process, "args").items():
                 argv[int(index)] = text_code(text)
             return call(
@@ -435,13 +433,13 @@ class _Export:
         """Return Python that gives the process's parameter file."""
         return f"{'HERE' if process in self.values.more else 'BUILD'} / {process.params_file!r}"
 
-    def _filled(self, process: PlanProcess, argv: Iterable[str]) -> list[CodeBlock | str]:
-        return [_filled(argument, self._file(process)) for argument in argv]
+    def _fill(self, process: PlanProcess, argv: Iterable[str]) -> list[CodeBlock | str]:
+        return [_fill_text(argument, self._file(process)) for argument in argv]
 
     def _environment(self, process: PlanProcess) -> dict[str, CodeBlock | str]:
         """Return the process's variables, as Python."""
         env: dict[str, CodeBlock | str] = {
-            name: _filled(value, self._file(process)) for name, value in process.env.items()
+            name: _fill_text(value, self._file(process)) for name, value in process.env.items()
         }
         return env | {
             name: text_code(text) for name, text in self._texts_of(process, "env").items()
@@ -465,7 +463,7 @@ class _Export:
         if isinstance(value, PythonCode):
             return str(value)
         if isinstance(value, str):
-            return _filled(value, self._file(process))
+            return _fill_text(value, self._file(process))
         if isinstance(value, list):
             return items([self._python(process, item) for item in value])
         if isinstance(value, dict):
@@ -480,7 +478,7 @@ class _Export:
     def _node(self, process: PlanProcess, more: list[CodeBlock | str]) -> CodeBlock:
         package = _EXECUTABLE.fullmatch(process.argv[0])
         own, ros_words = _rest(process)
-        argv = self._filled(process, own)
+        argv = self._fill(process, own)
         for index, text in self._texts_of(process, "args").items():
             argv[int(index)] = text_code(text)
         texts = {
@@ -498,11 +496,11 @@ class _Export:
         parts: list[CodeBlock | str] = [
             f"package={package[1]!r}" if package else "",
             f"executable={package[2]!r}" if package else "",
-            *_named(process),
+            *_name_actions(process),
             *named,
-            *self._remapped(process),
+            *self._remap(process),
             *([items(argv, "arguments")] if argv else []),
-            *([items(self._filled(process, ros_words), "ros_arguments")] if ros_words else []),
+            *([items(self._fill(process, ros_words), "ros_arguments")] if ros_words else []),
             *([items(parameters, "parameters")] if parameters else []),
             *more,
         ]
@@ -545,20 +543,20 @@ class _Export:
             "ComposableNode",
             f"package={found.package!r}",
             f"plugin={found.plugin!r}",
-            *_named(process),
-            *self._remapped(process),
+            *_name_actions(process),
+            *self._remap(process),
             *([items([_mapping(params)], "parameters")] if params else []),
             *more,
             *condition,
         )
 
-    def _remapped(self, process: PlanProcess) -> Iterator[CodeBlock]:
+    def _remap(self, process: PlanProcess) -> Iterator[CodeBlock]:
         remap: dict[str, CodeBlock | str] = {old: repr(new) for old, new in process.remap.items()}
         remap |= {old: text_code(text) for old, text in self._texts_of(process, "remap").items()}
         if remap:
             yield items((f"({old!r}, {new})" for old, new in remap.items()), "remappings")
 
-    def _included(self, process: PlanProcess) -> CodeBlock:
+    def _include(self, process: PlanProcess) -> CodeBlock:
         """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
         plan, parsed = self.plan, _LAUNCH.fullmatch(process.argv[0])
         package, file = (parsed[1], parsed[2]) if parsed else ("", "")
@@ -579,7 +577,7 @@ class _Export:
         ]
         rows = []
         for name, text, value in arguments:
-            code = text_code(text) if text else _filled(value, self._file(process))
+            code = text_code(text) if text else _fill_text(value, self._file(process))
             rows.append(f"({name!r}, {code})")
         arguments_code = items(rows)
         return call(
@@ -592,7 +590,7 @@ class _Export:
         )
 
 
-def _named(process: PlanProcess) -> Iterator[str]:
+def _name_actions(process: PlanProcess) -> Iterator[str]:
     namespace, _, node = process.nodes[0].rpartition("/")
     yield f"name={node!r}"
     yield f"namespace={namespace or '/'!r}"
@@ -662,7 +660,7 @@ def _variables(plan: Plan) -> Iterator[tuple[str, str]]:
     yield from middleware_variables(plan.ros, {}).items()
 
 
-def published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
+def edges_published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
     """Return the edges (parent, child) that a stock robot_state_publisher sends of this URDF.
 
     All but floating ones.
@@ -688,7 +686,7 @@ def _stock(plan: Plan, urdf: str) -> list[PlanEdge] | None:
     if any(_package(process) == STATE_PUBLISHER for process in plan.processes):
         return None
     edges = {(edge.parent, edge.child): edge for edge in plan.edges if edge.owner in own}
-    of_urdf = published_by(urdf, plan.ros.frame_prefix)
+    of_urdf = edges_published_by(urdf, plan.ros.frame_prefix)
     rest = [edge for ends, edge in edges.items() if ends not in of_urdf]
     if not of_urdf or of_urdf - set(edges) or any(edge.kind != "static" for edge in rest):
         return None
@@ -747,7 +745,7 @@ def _params(argv: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def _fixed(plan: Plan, edge: PlanEdge, name: str) -> CodeBlock:
+def _fixed_actions(plan: Plan, edge: PlanEdge, name: str) -> CodeBlock:
     ends = (repr(name), repr(edge.parent), repr(edge.child))
     numbers = (
         CodeBlock("(", tuple(map(number, part)), ")")
@@ -804,7 +802,7 @@ _WORDS = {
 }
 
 
-def _filled(argument: str, file: str) -> str:
+def _fill_text(argument: str, file: str) -> str:
     """Return the word as Python that knows the plan's folder.
 
     ``file`` is Python that gives the parameter file.

@@ -79,7 +79,7 @@ def collect_launch_values(
     for name, expression in uses.conditions.items():
         if name not in there and name not in more:
             uses.fix(f"${{{expression}}}")
-    kept, conditions = _settled(uses, kinds)
+    kept, conditions = _settle(uses, kinds)
     texts: dict[str, dict[str, Text]] = defaultdict(dict)
     for (process, place), text in kept.items():
         if process in there or process in more:
@@ -141,7 +141,7 @@ def _fix_conditions(uses: ArgumentUses, kinds: Mapping[str, str]) -> None:
             uses.fix(f"${{{uses.conditions.pop(name)}}}")
 
 
-def _settled(
+def _settle(
     uses: ArgumentUses, kinds: Mapping[str, str]
 ) -> tuple[dict[tuple[str, str], str], dict[str, str]]:
     """Return the texts and conditions that launch computes.
@@ -149,16 +149,16 @@ def _settled(
     Those of which nothing else needs an argument.
     """
     texts, conditions = dict(uses.texts), dict(uses.conditions)
-    for at, text in uses.texts.items():
+    for path, text in uses.texts.items():
         if _parts(text, kinds) is None:
-            del texts[at]
+            del texts[path]
             uses.fix(text)
     before = -1
     while before != len(uses.fixed):
         before = len(uses.fixed)
-        for at, text in list(texts.items()):
+        for path, text in list(texts.items()):
             if uses.fixed & names_of(text):
-                uses.fix(texts.pop(at))
+                uses.fix(texts.pop(path))
         for name, text in list(conditions.items()):
             if uses.fixed & names_of(f"${{{text}}}"):
                 uses.fix(f"${{{conditions.pop(name)}}}")
@@ -222,10 +222,10 @@ class _Combinations:
     def _build(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
         key = tuple(sorted(values.items()))
         if key not in self._built:
-            self._built[key] = self._compiled(values)
+            self._built[key] = self._compile(values)
         return self._built[key]
 
-    def _compiled(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
+    def _compile(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
         arguments = self.arguments
         args = {
             name: GivenArg(value, Span(f"{name}:={value}"))

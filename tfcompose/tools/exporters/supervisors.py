@@ -84,7 +84,7 @@ def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:
     return [*anywhere(python), "exec", plan_file, process.name]
 
 
-def exported_of(plan: Plan) -> dict[str, Exported]:
+def exported_processes(plan: Plan) -> dict[str, Exported]:
     """Return the processes as another supervisor starts them, by their names."""
     awaited = {
         name for process in plan.started for name, what in process.after.items() if what == "done"
@@ -130,7 +130,7 @@ def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
 
     ``dialects`` are what the keys of a process are to it.
     """
-    exported = exported_of(plan)
+    exported = exported_processes(plan)
     gaps = []
     if plan.guard.on_violation != "report":
         gaps.append(
@@ -242,7 +242,7 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     done is ``Type=oneshot``. One that is ready so many seconds after its start has only started,
     for systemd, when a sleep of so many has ended.
     """
-    exported = exported_of(plan)
+    exported = exported_processes(plan)
     names = {
         name: f"{plain_name(plan.robot)}-{plain}.service"
         for name, plain in plain_names(plan).items()
@@ -362,7 +362,7 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     the same host.
     """
     names = plain_names(plan)
-    exported = exported_of(plan)
+    exported = exported_processes(plan)
     services = {
         names[process.name]: _compose_service(plan, exported[process.name], machine, names)
         for process in plan.started
@@ -412,7 +412,7 @@ def _compose_service(
         "ipc": "host",
         "init": True,
         "command": [
-            _kept(argument) for argument in command_of(process, "python3", f"{INSIDE}/plan.json")
+            _escape(argument) for argument in command_of(process, "python3", f"{INSIDE}/plan.json")
         ],
         "environment": {"ROS_DOMAIN_ID": domain, **_discovery(plan)},
         "volumes": [
@@ -428,7 +428,7 @@ def _compose_service(
             condition = _MET[what if is_known else "started"]
             service["depends_on"][names[name]] = {"condition": condition}
     if plan.edges_of(process.name):
-        test = ["CMD", *map(_kept, probe_of(plan, process))]
+        test = ["CMD", *map(_escape, probe_of(plan, process))]
         service["healthcheck"] = {
             "test": test,
             "interval": "10s",
@@ -447,6 +447,6 @@ def _discovery(plan: Plan) -> dict[str, str]:
     return discovery | middleware_variables(plan.ros, {})
 
 
-def _kept(text: str) -> str:
+def _escape(text: str) -> str:
     """Return the text as compose reads it back: it fills in variables itself."""
     return text.replace("$", "$$")

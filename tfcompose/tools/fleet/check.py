@@ -28,9 +28,9 @@ def _check_shared_twice(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
     for robot in fleet.robots:
         for index, shared in enumerate(fleet.edges_of(robot)):
             parent, child = (fleet.final(robot, frame) for frame in shared.ends)
-            at = _path(fleet, robot, index)
-            other, place = first.setdefault(child, (robot, at))
-            if (other, place) == (robot, at):
+            path = _path(fleet, robot, index)
+            other, place = first.setdefault(child, (robot, path))
+            if (other, place) == (robot, path):
                 continue
             message = (
                 f"{parent} → {child} of {robot} is a second parent of {child}, which {other}"
@@ -39,8 +39,8 @@ def _check_shared_twice(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
             advice = (
                 "give the robots different prefixes" if other != robot else "remove one of them"
             )
-            notes = [Note("the other one", source.at(place))]
-            yield finding("TF880", message, source.at(at), notes=notes, help=advice)
+            notes = [Note("the other one", source.span_of(place))]
+            yield finding("TF880", message, source.span_of(path), notes=notes, help=advice)
 
 
 def _path(fleet: FleetSpec, robot: str, index: int) -> Path:
@@ -59,11 +59,11 @@ def _apart(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
             fleet.final(robot, frame) for shared in fleet.edges_of(robot) for frame in shared.ends
         }
         if not frames:
-            place = source.at_key(("robots", robot))
+            span = source.key_span(("robots", robot))
             yield finding(
                 "TF881",
                 f"{robot} shares no edge",
-                place,
+                span,
                 help="share: [map → odom, odom → base_link]",
             )
             continue
@@ -79,4 +79,4 @@ def _apart(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
         if robot not in reached:
             message = f"{robot} shares no frame with {names[0]}: there are no poses between them"
             advice = f"share an edge from one of shared_frames: {', '.join(fleet.shared_frames)}"
-            yield finding("TF881", message, source.at_key(("robots", robot)), help=advice)
+            yield finding("TF881", message, source.key_span(("robots", robot)), help=advice)

@@ -81,10 +81,10 @@ def run(arguments: Namespace) -> int:
     if len(names) != len(wanted) or len(files) > 1:
         usage = " ".join(["tfcompose fleet", arguments.action, *wanted, "[FILE]"])
         fail(f"fleet {arguments.action}: wrong number of names; usage: {usage}", UNREADABLE)
-    spec, found = _read(files[0] if files else _FILE)
-    print_findings(found, sys.stderr)
+    spec, findings = _read(files[0] if files else _FILE)
+    print_findings(findings, sys.stderr)
     if spec is None or arguments.action == "lint":
-        return _lint_code(found)
+        return _lint_code(findings)
     refuse_without_zenoh()
     if arguments.action == "share":
         return _share(spec, names[0], arguments.namespace)
@@ -128,12 +128,12 @@ def _read(file: str) -> tuple[FleetSpec | None, list[Finding]]:
         spec = validate_fleet(source)
     except RejectedError as error:
         return None, list(error.findings)
-    found = list(check_fleet(spec, source))
-    return (None if _lint_code(found) else spec), found
+    findings = list(check_fleet(spec, source))
+    return (None if _lint_code(findings) else spec), findings
 
 
-def _lint_code(found: list[Finding]) -> int:
-    errors = [finding for finding in found if finding.severity == "error"]
+def _lint_code(findings: list[Finding]) -> int:
+    errors = [finding for finding in findings if finding.severity == "error"]
     return exit_code_of(errors) if errors else 0
 
 
@@ -171,18 +171,18 @@ def _report(observer: FleetObserver, arguments: Namespace) -> int:
     else:
         time.sleep(arguments.duration)
     if arguments.action == "doctor":
-        found = list(observer.findings())
+        findings = list(observer.findings())
         if arguments.format == "json":
             from tfcompose.compiler.render.formats import render_json
 
-            sys.stdout.write(render_json(found))
+            sys.stdout.write(render_json(findings))
         else:
-            print_findings(found, sys.stdout)
+            print_findings(findings, sys.stdout)
             print(
-                f"looked at {len(observer.fleet.robots)} robots: {len(found) or 'nothing is'}"
+                f"looked at {len(observer.fleet.robots)} robots: {len(findings) or 'nothing is'}"
                 " wrong"
             )
-        return exit_code_of(found) if found else 0
+        return exit_code_of(findings) if findings else 0
     robots = observer.status()
     if arguments.format == "json":
         from dataclasses import asdict

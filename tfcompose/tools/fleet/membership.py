@@ -9,10 +9,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.model.robot import Process
 from tfcompose.spec.language.recognition import load_named
-from tfcompose.spec.load import path_named
+from tfcompose.spec.load import find_path
 from tfcompose.tools.fleet.check import check_fleet
 from tfcompose.tools.fleet.preflight import SHARE_COMMAND
 from tfcompose.tools.fleet.spec import FleetSpec, validate_fleet
@@ -35,12 +35,12 @@ def share_process(section: ToolSection) -> Iterator[Process]:
 
     It is ready once it is started, and its failure ends nothing: no robot needs the others to run.
     """
-    file = path_named(section.value.file, section.at("file"))
+    file = find_path(section.value.file, section.span_of("file"))
     spec = section.spec
     yield Process(
         SHARE,
         "run",
-        at=section.at_key(),
+        span=section.key_span(),
         argv=(*SHARE_COMMAND, _name(section), f"${{file:{file}}}", *_below(spec)),
         restart="on-failure",
         required=False,
@@ -68,10 +68,10 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
     It cannot be read, or names what the robot is not.
     """
     spec, member = section.spec, section.value
-    at = section.at("file")
-    path = path_named(member.file, at)
+    span = section.span_of("file")
+    path = find_path(member.file, span)
     if section.read is None:
-        return [finding("TF001", f"{path}: files cannot be read here", at)]
+        return [finding("TF001", f"{path}: files cannot be read here", span)]
     try:
         fleet_source = load_named(section.read(path), path, FleetSpec)
         fleet = validate_fleet(fleet_source)
@@ -82,17 +82,17 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
         wrong = list(error.findings)
     if wrong:
         return [
-            replace(finding, notes=(*finding.notes, Note("named here", at))) for finding in wrong
+            replace(finding, notes=(*finding.notes, Note("named here", span))) for finding in wrong
         ]
     name = _name(section)
     if name not in fleet.robots:
-        place = section.at("robot") if member.robot else spec.at(("robot",))
+        span = section.span_of("robot") if member.robot else spec.span_of(("robot",))
         known = (
-            f"there is {listed(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
+            f"there is {list_names(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
             " NAME}"
         )
         advice = did_you_mean(name, fleet.robots, known)
-        return [finding("TF886", f"no robot {name} in {path}", place, help=advice)]
+        return [finding("TF886", f"no robot {name} in {path}", span, help=advice)]
     return _unknown_edges(robot, name, fleet, fleet_source, section)
 
 
@@ -104,19 +104,21 @@ def _unknown_edges(
     Where entries of the robot were refused, or a key stands twice, nobody knows which edges it was
     meant to have.
     """
-    if robot.broken or any(finding.code == "TF003" for finding in section.spec.spans.found):
+    if robot.broken or any(finding.code == "TF003" for finding in section.spec.spans.findings):
         return []
     edges = {(robot.final(edge.parent), robot.final(edge.child)) for edge in robot.edges}
     named = [f"{parent} → {child}" for parent, child in edges]
     inside = ("share",) if fleet.robots[name].share is None else ("robots", name, "share")
-    found = []
+    findings = []
     for index, shared in enumerate(fleet.edges_of(name)):
         if shared.ends in edges:
             continue
         message = f"{name} shares {' → '.join(shared.ends)} in the fleet, but has no such edge"
-        notes = [Note("it is shared here", fleet_source.at((*inside, index)))]
+        notes = [Note("it is shared here", fleet_source.span_of((*inside, index)))]
         advice = did_you_mean(
             " → ".join(shared.ends), named, "an edge is a parent and its child on the live tree"
         )
-        found.append(finding("TF887", message, section.at("file"), notes=notes, help=advice))
-    return found
+        findings.append(
+            finding("TF887", message, section.span_of("file"), notes=notes, help=advice)
+        )
+    return findings

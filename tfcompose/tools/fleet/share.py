@@ -65,7 +65,7 @@ class SharedEdges:
         self._period_of |= {edge: now_ns // self._periods_ns[edge] for edge in due}
         return encode(list(found.values()))
 
-    def fixed(self) -> bytes:
+    def fixed_message(self) -> bytes:
         """Return all fixed edges that came until now, as one message."""
         return encode(list(self._fixed.values()))
 
@@ -127,7 +127,7 @@ class EdgeSender:
             self._refused = False
             self._say(f"sharing on {self._key} at {self._router}")
         with self._lock:
-            fixed = self.edges.fixed()
+            fixed = self.edges.fixed_message()
         self._put("tf_static", fixed)
 
     def close(self) -> None:

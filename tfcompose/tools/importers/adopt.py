@@ -101,7 +101,7 @@ def _print_status(arguments: Namespace) -> int:
         disk=disk(sources=[file], trusts_files=arguments.trust),
     )
     if compiled.robot is None or compiled.errors:
-        reject(compiled.found)
+        reject(compiled.findings)
     source = with_includes(load(text, file), read_text)
     publishers = _draft_of_launch_file(arguments).publishers if arguments.file else {}
     lines = list(_status(compiled.robot, source, publishers))
@@ -123,10 +123,11 @@ def _status(robot: Robot, source: Source, publishers: Mapping[str, Span | None])
         started = publishers.get(name if section == "parts" else edge.child)
         yield from _edits(edge, source, started, nodes[edge.owner])
         if counts[edge.owner] == 1 or section == "parts":
-            at = source.at_key(("processes", edge.owner))
+            at = source.key_span(("processes", edge.owner))
             yield f"  remove  {at}: {edge.owner}, which owns no other edge"
             if len(source.mapping("processes")) == 1:
-                yield f"  remove  {source.at_key(('processes',))}: processes, which is empty then"
+                emptied = source.key_span(("processes",))
+                yield f"  remove  {emptied}: processes, which is empty then"
 
 
 def _edits(edge: Edge, source: Source, started: Span | None, node: str) -> Iterator[str]:
@@ -139,4 +140,4 @@ def _edits(edge: Edge, source: Source, started: Span | None, node: str) -> Itera
     yield f"{what}: published by {node}"
     where = f"{started.file}:{started.line}" if started else "in the launch file"
     yield f"  remove  {where}: the start of {node}"
-    yield f"  write   {source.at_key((section, name))}: {name}: {flow(kept)}"
+    yield f"  write   {source.key_span((section, name))}: {name}: {flow(kept)}"

@@ -254,14 +254,14 @@ def observed_draft(arguments: Namespace, *, is_adopted: bool = False) -> ImportD
     With ``is_adopted`` fixed edges of stock nodes stay with those.
     """
     from tfcompose.cli.compiling import library
-    from tfcompose.cli.live import observed
+    from tfcompose.cli.live import observe_topics
     from tfcompose.model.plan.topics import topics_below
     from tfcompose.tf.ros.processes import words_of
     from tfcompose.tools.importers.draft import ImportDraft, robot_name
     from tfcompose.tools.importers.observed import Observed
 
     topics = topics_below(arguments.namespace)
-    observer = observed(
+    observer = observe_topics(
         "tfcompose_import", [topics], bag=arguments.bag, duration_s=arguments.duration
     )[topics]
     if arguments.bag:
@@ -343,20 +343,20 @@ def finish(draft: ImportDraft, arguments: Namespace) -> int:
     from tfcompose.tools.importers.draft import text_with_findings
 
     if draft.is_empty():
-        print_findings(draft.found, sys.stderr)
+        print_findings(draft.findings, sys.stderr)
         fail("nothing was written: the source starts nothing that a robot file has")
     folder = posixpath.dirname(arguments.output or "")
     neighbours = {posixpath.join(folder, path): text for path, text in draft.neighbours.items()}
     _write_neighbours(neighbours, arguments)
     text, compiled = text_with_findings(draft, lambda text: _lint(text, arguments))
     _write(text, arguments.output)
-    print_findings(draft.found, sys.stderr)
-    found = (
-        compiled.found
+    print_findings(draft.findings, sys.stderr)
+    findings = (
+        compiled.findings
         if arguments.output
-        else [replace(finding, span=None, notes=()) for finding in compiled.found]
+        else [replace(finding, span=None, notes=()) for finding in compiled.findings]
     )
-    print_findings(list(dict.fromkeys(found)), sys.stderr)
+    print_findings(list(dict.fromkeys(findings)), sys.stderr)
     return FAILED if compiled.errors else 0
 
 
@@ -368,8 +368,8 @@ def _write_neighbours(files: dict[str, str], arguments: Namespace) -> None:
     if not arguments.output:
         message = "{}, which the robot file names, is written only beside a robot file"
         advice = "import … -o FILE writes both"
-        found = [finding("TF020", message.format(path), None, help=advice) for path in files]
-        print_findings(found, sys.stderr)
+        findings = [finding("TF020", message.format(path), None, help=advice) for path in files]
+        print_findings(findings, sys.stderr)
         return
     for path in files:
         if exists(path) and not arguments.force:
@@ -456,10 +456,10 @@ def _robot_file(
 ) -> tuple[str, list[Finding]]:
     """Return the robot file, and the errors that it has where the source has none."""
     from tfcompose.cli.compiling import library
-    from tfcompose.tools.importers.robot_file import imported, with_findings
+    from tfcompose.tools.importers.robot_file import import_document, with_findings
 
     presets = None if arguments.no_sensors else library()
-    robot = imported(document, _target(arguments), arguments.robot or "", packages, presets)
+    robot = import_document(document, _target(arguments), arguments.robot or "", packages, presets)
     return with_findings(robot, arguments.file, lambda text: _lint(text, arguments))
 
 

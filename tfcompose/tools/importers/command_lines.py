@@ -12,7 +12,7 @@ from tfcompose.foundation.findings import RejectedError
 from tfcompose.spec.load.params import load_params
 from tfcompose.tools.importers.node_params import value_in
 from tfcompose.tools.importers.static_transforms import PROGRAM
-from tfcompose.tools.importers.texts import Text, concatenated, partition, parts_of
+from tfcompose.tools.importers.texts import Text, concatenate, partition, parts_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,7 +43,7 @@ def _without_shell(program: Program) -> Program:
     The arguments of a package's program are split so too, and what more a shell does with them is
     left out with a word.
     """
-    text = concatenated(program.argv, " ")
+    text = concatenate(program.argv, " ")
     is_known = all(isinstance(part, str) for part in parts_of(text))
     does_more = not is_known or bool(_OF_SHELLS.search(text))
     argv = program.argv

@@ -63,10 +63,10 @@ class ImportDraft:
     """A robot file in the making.
 
     ``sections`` hold plain data as in a robot file, ``notes`` the comments above entries,
-    ``found`` what is not imported: each of those is a comment as well. ``head`` are comments above
-    everything, ``base`` the robot's base where it is not the usual one. ``brought`` are frames
-    that sensors bring: they are no roots. With ``has_unknown_frames`` there are parts that bring
-    others, whose names are not known.
+    ``findings`` what is not imported: each of those is a comment as well. ``head`` are comments
+    above everything, ``base`` the robot's base where it is not the usual one. ``brought`` are
+    frames that sensors bring: they are no roots. With ``has_unknown_frames`` there are parts that
+    bring others, whose names are not known.
     """
 
     robot: str
@@ -76,7 +76,7 @@ class ImportDraft:
         default_factory=lambda: {name: {} for name in SECTIONS}
     )
     notes: dict[Entry, list[str]] = field(default_factory=dict)
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     brought: set[str] = field(default_factory=set)
     has_unknown_frames: bool = False
     #: The files that the source may have read: all those that a user names.
@@ -94,20 +94,20 @@ class ImportDraft:
     #: Where a launch file starts publishers: of a fixed edge, by its child, and of a part.
     publishers: dict[str, Span | None] = field(default_factory=dict)
 
-    def note(self, at: Entry, *texts: str) -> None:
+    def note(self, path: Entry, *texts: str) -> None:
         """Put comments above an entry, each once."""
-        known = self.notes.setdefault(at, [])
+        known = self.notes.setdefault(path, [])
         known += [text for text in texts if text not in known]
 
     def todo(
-        self, message: str, span: Span | None, at: Entry = ("", ""), advice: str = ""
+        self, message: str, span: Span | None, path: Entry = ("", ""), advice: str = ""
     ) -> None:
         """Say that something of the source is not imported: in a comment, and as a finding."""
         where = f"{posixpath.basename(span.file)}:{span.line}: " if span and span.file else ""
-        self.note(at, f"TODO {where}{message}")
+        self.note(path, f"TODO {where}{message}")
         noted = finding("TF020", message, span, help=advice)
-        if noted not in self.found:
-            self.found.append(noted)
+        if noted not in self.findings:
+            self.findings.append(noted)
 
     def frame(
         self, parent: str, child: str, keys: Mapping[str, Any], span: Span | None, *notes: str
@@ -117,7 +117,7 @@ class ImportDraft:
         known = frames.get(child)
         if known is not None:
             same = known == {"parent": parent, **keys}
-            more = "" if same else f"; {_described(parent, keys)} here"
+            more = "" if same else f"; {_describe(parent, keys)} here"
             self.todo(f"{child} is published a second time{more}", span, ("frames", child))
             return False
         frames[child] = {**({"parent": parent} if parent else {}), **keys}
@@ -147,7 +147,7 @@ class ImportDraft:
         """Return the section of a process that is there, or of a container, with its name."""
         return ("containers" if process in self.sections["containers"] else "processes", process)
 
-    def started(self) -> dict[str, dict[str, Any]]:
+    def started_entries(self) -> dict[str, dict[str, Any]]:
         """Return the containers and processes by their names."""
         return {**self.sections["containers"], **self.sections["processes"]}
 
@@ -231,13 +231,13 @@ def path_from(target: Target, path: str) -> str:
     )
 
 
-def where(at: Span | None, what: str = "") -> str:
+def where(span: Span | None, what: str = "") -> str:
     """Return the place of a value as a comment has it."""
-    place = f"{posixpath.basename(at.file)}:{at.line}" if at and at.file else ""
+    place = f"{posixpath.basename(span.file)}:{span.line}" if span and span.file else ""
     return ": ".join(part for part in (place, what) if part)
 
 
-def _described(parent: str, keys: Mapping[str, Any]) -> str:
+def _describe(parent: str, keys: Mapping[str, Any]) -> str:
     return flow({"parent": parent, **keys})
 
 

@@ -14,7 +14,7 @@ from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
 from tfcompose.foundation.reading import is_file, is_folder, names_in
 from tfcompose.tools.importers.draft import pose_keys, where
-from tfcompose.tools.importers.texts import Argument, Text, concatenated
+from tfcompose.tools.importers.texts import Argument, Text, concatenate
 from tfcompose.tools.importers.yaml_text import ExpressionText
 
 if TYPE_CHECKING:
@@ -95,21 +95,21 @@ def add_autoware(draft: ImportDraft, source: Source) -> None:
     for parent, children in source.data.items():
         for child, values in children.items():
             path: Steps = (parent, child)
-            at = source.at_key(path)
+            span = source.key_span(path)
             numbers = [values.get(axis, 0.0) for axis in _AXES]
             if not all(
                 isinstance(value, (int, float)) and not isinstance(value, bool)
                 for value in numbers
             ):
-                draft.todo(f"{child}: its values are no numbers", at)
+                draft.todo(f"{child}: its values are no numbers", span)
                 continue
             x, y, z, roll, pitch, yaw = map(float, numbers)
             rpy = (roll, pitch, yaw)
             pose = Pose((x, y, z), quat_from_rpy(*rpy))
-            draft.frame(str(parent), str(child), pose_keys(pose, rpy), at, where(at))
+            draft.frame(str(parent), str(child), pose_keys(pose, rpy), span, where(span))
             left = sorted(values.keys() - set(_AXES))
             if left:
-                draft.todo(f"{child}: {', '.join(left)}", at, ("frames", str(child)))
+                draft.todo(f"{child}: {', '.join(left)}", span, ("frames", str(child)))
 
 
 #: In a package of individual parameters: config/VEHICLE/KIT/….
@@ -168,14 +168,14 @@ def add_vehicles(
     for name in _CALIBRATIONS:
         files = {vehicle: config / vehicle / kit / name for vehicle in vehicles}
         sources = {vehicle: read(str(file)) for vehicle, file in files.items() if is_file(file)}
-        path = concatenated([target.from_folder(str(config)), of_vehicle, kit, name], "/")
-        for (parent, child), having in _calibrated(draft, sources).items():
+        path = concatenate([target.from_folder(str(config)), of_vehicle, kit, name], "/")
+        for (parent, child), having in _calibrated_edges(draft, sources).items():
             keys: dict[str, Any] = {"calibration": path}
             if len(having) < len(vehicles):
                 keys["when"] = ExpressionText(
-                    " or ".join(f"args.vehicle_id == {_quoted(vehicle)}" for vehicle in having)
+                    " or ".join(f"args.vehicle_id == {_quote(vehicle)}" for vehicle in having)
                 )
-            draft.frame(parent, child, keys, sources[having[0]].at_key((parent, child)))
+            draft.frame(parent, child, keys, sources[having[0]].key_span((parent, child)))
 
 
 def _folders_of_kits(config: Path) -> Iterator[Path]:
@@ -184,11 +184,11 @@ def _folders_of_kits(config: Path) -> Iterator[Path]:
         yield from (vehicle / name for name in names_in(vehicle))
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return f'"{text}"' if "'" in text else f"'{text}'"
 
 
-def _calibrated(
+def _calibrated_edges(
     draft: ImportDraft, sources: Mapping[str, Source]
 ) -> dict[tuple[str, str], list[str]]:
     """Return the edges of calibrations, each with the vehicles that have it."""
@@ -233,8 +233,8 @@ class _Clearpath:
 
     def __init__(self, draft: ImportDraft, source: Source) -> None:
         self.draft, self.source, self.data = draft, source, source.data
-        found = _NUMBERED.match(source.data["serial_number"])
-        self.platform = found[1] if found else ""
+        match = _NUMBERED.match(source.data["serial_number"])
+        self.platform = match[1] if match else ""
 
     def add(self) -> None:
         """Add all sections."""
@@ -266,7 +266,7 @@ class _Clearpath:
             "manipulators",
         }
         for key in self.data.keys() - known:
-            self.draft.todo(f"{key} is not imported", self.source.at_key((key,)))
+            self.draft.todo(f"{key} is not imported", self.source.key_span((key,)))
 
     def _kinds(self, section: str) -> list[str]:
         found = self.data.get(section)
@@ -292,25 +292,27 @@ class _Clearpath:
         if namespace:
             self.draft.sections["ros"] |= {"namespace": namespace, "isolate": "topics"}
             self.draft.note(
-                ("ros", "namespace"), where(self.source.at_key(("system", "ros2", "namespace")))
+                ("ros", "namespace"),
+                where(self.source.key_span(("system", "ros2", "namespace"))),
             )
         domain = settings.get("domain_id")
         if isinstance(domain, int):
             self.draft.sections["ros"]["domain_id"] = domain
         for key in settings.keys() - {"namespace", "domain_id"}:
             self.draft.todo(
-                f"system.ros2.{key}: {settings[key]}", self.source.at_key(("system", "ros2", key))
+                f"system.ros2.{key}: {settings[key]}",
+                self.source.key_span(("system", "ros2", key)),
             )
         for key in system.keys() - {"ros2"} if isinstance(system, dict) else ():
-            self.draft.todo(f"system.{key} is not imported", self.source.at_key(("system", key)))
+            self.draft.todo(f"system.{key} is not imported", self.source.key_span(("system", key)))
 
     def _platform(self) -> None:
         platform = self.data.get("platform")
         settings = platform if isinstance(platform, dict) else {}
-        at = self.source.at_key(("serial_number",))
+        span = self.source.key_span(("serial_number",))
         if not self.platform or self.platform == "generic":
             self.draft.todo(
-                f"the platform {self.data['serial_number']}: its description is of its own", at
+                f"the platform {self.data['serial_number']}: its description is of its own", span
             )
         else:
             model = self.platform
@@ -322,7 +324,7 @@ class _Clearpath:
                 "include": [_COMMON],
             }
             self.draft.sections["parts"]["platform"] = keys
-            self.draft.note(("parts", "platform"), where(at))
+            self.draft.note(("parts", "platform"), where(span))
         attachments = settings.get("attachments")
         for index, entry in enumerate(attachments if isinstance(attachments, list) else []):
             path: Steps = ("platform", "attachments", index)
@@ -331,7 +333,7 @@ class _Clearpath:
             of, _, kind = str(entry.get("type", "")).rpartition(".")
             if entry.get("enabled") is False:
                 self.draft.todo(
-                    f"the attachment {entry.get('name')} is not enabled", self.source.at(path)
+                    f"the attachment {entry.get('name')} is not enabled", self.source.span_of(path)
                 )
                 continue
             of = of or self.platform
@@ -342,7 +344,7 @@ class _Clearpath:
             )
         for key in settings.keys() - {"attachments", "wheel"}:
             self.draft.todo(
-                f"platform.{key} is not imported", self.source.at_key(("platform", key))
+                f"platform.{key} is not imported", self.source.key_span(("platform", key))
             )
 
     def _of_platform(self) -> str:
@@ -364,14 +366,14 @@ class _Clearpath:
         for key in own.keys() & {"offset_xyz", "offset_rpy"}:
             self.draft.todo(
                 f"{name}: {key}, which Clearpath's macros do not take",
-                self.source.at_key((*path, key)),
+                self.source.key_span((*path, key)),
             )
             del own[key]
         return own
 
     def _part(self, name: str, file: str, macro: str, entry: dict[str, Any], path: Steps) -> None:
         """Add what the generator calls a macro for."""
-        at = self.source.at(path)
+        span = self.source.span_of(path)
         params: dict[str, Any] = {"name": name, "parent_link": entry.get("parent", _MOUNT)}
         origin = self._origin(entry, path)
         params |= {key: _words(value) for key, value in entry.items() if key not in _OF_CALL}
@@ -388,7 +390,7 @@ class _Clearpath:
             "include": include,
         }
         self.draft.sections["parts"][name] = keys
-        self.draft.note(("parts", name), where(at))
+        self.draft.note(("parts", name), where(span))
 
     def _origin(self, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
         vectors: dict[str, Vector] = {}
@@ -396,7 +398,7 @@ class _Clearpath:
             value = entry.get(key, [0.0, 0.0, 0.0])
             is_one = isinstance(value, list) and len(value) == len(_AXES) // 2
             if not is_one or not all(isinstance(number, (int, float)) for number in value):
-                self.draft.todo(f"{key}: {value}", self.source.at((*path, key)))
+                self.draft.todo(f"{key}: {value}", self.source.span_of((*path, key)))
                 value = [0.0, 0.0, 0.0]
             x, y, z = map(float, value)
             vectors[key] = (x, y, z)
@@ -405,9 +407,9 @@ class _Clearpath:
         }
 
     def _sensor(self, name: str, entry: dict[str, Any], path: Steps) -> None:
-        at, model = self.source.at(path), str(entry.get("model", ""))
+        span, model = self.source.span_of(path), str(entry.get("model", ""))
         if entry.get("urdf_enabled") is False:
-            self.draft.todo(f"{name}, {model}: urdf_enabled is false", at)
+            self.draft.todo(f"{name}, {model}: urdf_enabled is false", span)
             return
         call = {key: value for key, value in entry.items() if key in _OF_CALL} | self._camera(
             model, entry
@@ -427,7 +429,7 @@ class _Clearpath:
                 "sensors: {NAME: {preset: VENDOR/MODEL, …}} starts it; tfcompose presets lists"
                 " them"
             )
-            self.draft.todo(message, at, ("parts", name), advice)
+            self.draft.todo(message, span, ("parts", name), advice)
 
     def _camera(self, model: str, entry: dict[str, Any]) -> dict[str, Any]:
         """Return the parameter that selects a camera of a family, if frames depend on it."""
@@ -484,7 +486,7 @@ class _Clearpath:
                 self._part(f"{name}_gripper", file, grip, held, (*path, "gripper"))
             for key in entry.keys() & {"ros_parameters"}:
                 self.draft.todo(
-                    f"{name}: {key}", self.source.at_key((*path, key)), ("parts", name)
+                    f"{name}: {key}", self.source.key_span((*path, key)), ("parts", name)
                 )
 
 

@@ -39,8 +39,8 @@ from tfcompose.tools.importers.program import (
 from tfcompose.tools.importers.programs import add_program
 from tfcompose.tools.importers.robot_settings import (
     SEVERAL,
+    is_isolated,
     is_setting,
-    isolated,
     one_clock,
     one_namespace,
 )
@@ -99,13 +99,13 @@ def add_launch(draft: ImportDraft, launch: Launch, target: Target) -> list[Descr
         work.add(record)
     work.finish(answer["decided"])
     if answer["stopped"]:
-        at = launch.span(answer["line"])
+        span = launch.span(answer["line"])
         if not any(
             record["kind"] not in {"package", "todo", "argument", "file"}
             for record in answer["records"]
         ):
-            raise RejectedError([finding("TF002", answer["stopped"], at), *draft.found])
-        draft.todo(f"the launch file is not read to its end: {answer['stopped']}", at)
+            raise RejectedError([finding("TF002", answer["stopped"], span), *draft.findings])
+        draft.todo(f"the launch file is not read to its end: {answer['stopped']}", span)
     return work.descriptions
 
 
@@ -145,7 +145,7 @@ class _LaunchImport:
             "include": self._include,
             "argument": self._argument,
             "lifecycle": self._lifecycle,
-            "required": self._required,
+            "required": self._keep_required,
         }
         if kind in adders:
             adders[kind](record, span)
@@ -168,7 +168,7 @@ class _LaunchImport:
         one_clock(self.draft)
         self._args({*decided, *self._read})
         self._into_containers()
-        started = self.draft.started()
+        started = self.draft.started_entries()
         for name, after in self._after:
             own = started[name].get("container")
             known = {
@@ -213,7 +213,7 @@ class _LaunchImport:
             self.draft.todo(f"nothing that is imported reads {named}", next(iter(unread.values())))
         fixed: dict[str, Span] = {}
         for name, (record, span) in self._arguments.items():
-            value, at = record["value"], ("args", name)
+            value, path = record["value"], ("args", name)
             if name in used:
                 typed = scalar_of(value)
                 kind = {str: "string", float: "float"}.get(type(typed))
@@ -232,12 +232,12 @@ class _LaunchImport:
                 )
                 keys |= {"env": record["variable"]} if record["variable"] else {}
                 self.draft.sections["args"][name] = keys
-                self.draft.note(at, where(span))
+                self.draft.note(path, where(span))
             if name in decided:
                 fixed[f"{name}:={relative(value) or repr('')}"] = span
                 if name in used:
                     self.draft.note(
-                        at,
+                        path,
                         f"where it decides what is started, or is computed with, it is {value!r}",
                     )
         if fixed:
@@ -279,11 +279,11 @@ class _LaunchImport:
             for child in self.draft.sections["frames"].keys() - before:
                 self._conditions(record, ("frames", child))
             return
-        self._started(record, name)
+        self._keep_started(record, name)
         if program.loads:
             self._containers[str(record["id"])] = self._containers[_full_name(program)] = name
 
-    def _started(self, record: dict[str, Any], name: str) -> None:
+    def _keep_started(self, record: dict[str, Any], name: str) -> None:
         """Keep of what was added when it is started."""
         self._names[str(record.get("id"))] = name
         self._conditions(record, self.draft.entry_of(name))
@@ -308,7 +308,7 @@ class _LaunchImport:
             unnamed = "the name that its class gives the component: here it has another"
             program = replace(program, todo=(*program.todo, unnamed))
         name = add_program(self.draft, program, self.target) or ""
-        self._started(record, name)
+        self._keep_started(record, name)
         self._components.append((name, record["container"], span))
 
     def _into_containers(self) -> None:
@@ -330,11 +330,11 @@ class _LaunchImport:
                 )
             self.draft.sections["processes"][name]["container"] = self._containers[wanted]
 
-    def _conditions(self, record: dict[str, Any], at: tuple[str, str]) -> None:
+    def _conditions(self, record: dict[str, Any], path: tuple[str, str]) -> None:
         for text in record.get("when", ()):
-            self.draft.note(at, f"only if {text}")
+            self.draft.note(path, f"only if {text}")
         if record.get("only_when"):
-            entry = self.draft.sections[at[0]][at[1]]
+            entry = self.draft.sections[path[0]][path[1]]
             entry["when"] = ExpressionText(record["only_when"])
 
     def _program(self, record: dict[str, Any], span: Span) -> Program:
@@ -432,7 +432,7 @@ class _LaunchImport:
         if self._only_when:
             self.draft.todo(f"robot_state_publisher is there only when {self._only_when}", span)
         self.descriptions.append(
-            replace(described, at=span, prefix=str(rest.get("frame_prefix", "")))
+            replace(described, span=span, prefix=str(rest.get("frame_prefix", "")))
         )
 
     def _state_publisher_params(
@@ -468,7 +468,7 @@ class _LaunchImport:
             message = f"a robot in {space}, where another one is in {ros['namespace']}"
             self.draft.todo(message, span, advice=SEVERAL)
         moved = dict(program.remap)
-        if not isolated(self.draft, moved, program.namespace):
+        if not is_isolated(self.draft, moved, program.namespace):
             self.draft.todo(f"robot_state_publisher is remapped: {moved}", span)
         for message in program.todo:
             self.draft.todo(message, span)
@@ -503,21 +503,21 @@ class _LaunchImport:
         if name is None:
             self.draft.todo("a change of a lifecycle node's state", span)
         else:
-            process = self.draft.started()[name]
+            process = self.draft.started_entries()[name]
             (node,) = process.get("nodes", {"": process}).values()
             if node.get("lifecycle") != "active":
                 node["lifecycle"] = record["state"]
 
-    def _required(self, record: dict[str, Any], span: Span) -> None:
+    def _keep_required(self, record: dict[str, Any], span: Span) -> None:
         name = self._names.get(str(record["node"]))
         if name is None:
             self.draft.todo("the end of a process ends all", span)
         else:
-            self.draft.started()[name]["required"] = True
+            self.draft.started_entries()[name]["required"] = True
 
     def _delay(self) -> None:
         """Let what a timer starts wait: for a process that counts as ready after that time."""
-        processes, started = self.draft.sections["processes"], self.draft.started()
+        processes, started = self.draft.sections["processes"], self.draft.started_entries()
         gates: dict[float, str] = {}
         unfit = {name for name, _ in self._delays}
         unfit |= {self._names.get(key, "") for _, after in self._after for key in after}

@@ -118,7 +118,9 @@ def answer_of(launch: Launch, reach: Reach, reader: str) -> dict[str, Any]:
     if fits(answer, _ANSWER) and all(map(_is_record, answer["records"])):
         records = list(map(_with_texts, answer["records"]))
         return {**answer, "records": records, "stopped": answer["stopped"][:_LONGEST]}
-    raise RejectedError([finding("TF008", f"the launch file {_ended(outcome)}", launch.span())])
+    raise RejectedError(
+        [finding("TF008", f"the launch file {_describe_end(outcome)}", launch.span())]
+    )
 
 
 _NUMBER, _OPTIONAL = (int, float), (str, None)
@@ -255,7 +257,7 @@ def _value_with_texts(value: Any) -> Any:
     return list(map(from_json, value)) if isinstance(value, list) else from_json(value)
 
 
-def _ended(outcome: Outcome) -> str:
+def _describe_end(outcome: Outcome) -> str:
     """Return how the process ended that read a launch file, without an answer."""
     if outcome.timed_out:
         return f"takes more than {confined.MOST_WALL_S:g} s"
@@ -265,10 +267,10 @@ def _ended(outcome: Outcome) -> str:
         return "was ended: its answer is none"
     if outcome.code >= 0:
         return f"ends the process that reads it, with code {outcome.code}"
-    return _ended_by(-outcome.code)
+    return _describe_signal(-outcome.code)
 
 
-def _ended_by(number: int) -> str:
+def _describe_signal(number: int) -> str:
     """Return what a signal says of the launch file whose process it ended."""
     if number == signal.SIGXCPU:
         return "takes too long"

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 def attach(context: RecordingContext) -> None:
     """Let launch files import these modules."""
     _find_in_index(context)
-    replaced = _replaced(context)
+    replaced = _replaced_names(context)
     if importlib.util.find_spec("moveit_configs_utils"):
         del replaced["moveit_configs_utils"]  # its own code knows best what it reads
     for name in [name for name in sys.modules if name.partition(".")[0] in replaced]:
@@ -69,7 +69,7 @@ def _find_in_index(context: RecordingContext) -> None:
         )
 
 
-def _replaced(context: RecordingContext) -> dict[str, dict[str, Any]]:
+def _replaced_names(context: RecordingContext) -> dict[str, dict[str, Any]]:
     """Return what the modules of packages have that are replaced, by the packages' names."""
 
     def share(name: str) -> str:

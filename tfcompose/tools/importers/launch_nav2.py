@@ -13,7 +13,7 @@ import yaml
 from launch.substitutions import LaunchConfiguration
 
 from tfcompose.tools.importers.launch_objects import here
-from tfcompose.tools.importers.launch_parameters import made_file, text_of
+from tfcompose.tools.importers.launch_parameters import file_of_text, text_of
 from tfcompose.tools.importers.launch_records import PACKAGE, FailedError, file_text, with_package
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class _FromFile(launch.Substitution):  # type: ignore[misc]
         """Return the path of the file, or its address in a package that is not found."""
         return with_package(text_of(self.source_file, context))
 
-    def changed(
+    def write_changed(
         self, context: RecordingContext, changes: Mapping[str, str], change: Callable[[str], str]
     ) -> str:
         """Return the path of the file with changes, which are named where it cannot be read."""
@@ -58,7 +58,7 @@ class _FromFile(launch.Substitution):  # type: ignore[misc]
             context.todo(self.at, f"changes in {Path(file).name}: {texts}")
             return file
         source = file_text(file)
-        return made_file(file, source, change(source), self.at, context)
+        return file_of_text(file, source, change(source), self.at, context)
 
 
 def _texts(values: Mapping[str, Any] | None, context: RecordingContext) -> dict[str, str]:
@@ -86,7 +86,7 @@ class ReplaceString(_FromFile):
                 source = source.replace(old, new)
             return source
 
-        return self.changed(context, texts, replaced)
+        return self.write_changed(context, texts, replaced)
 
 
 class RewrittenYaml(_FromFile):
@@ -115,7 +115,7 @@ class RewrittenYaml(_FromFile):
             data = self._with_values(_with_keys(data, keys), values)
             return yaml.safe_dump({root: data} if root else data)
 
-        return self.changed(context, {**params, **keys, **values, **below}, rewritten)
+        return self.write_changed(context, {**params, **keys, **values, **below}, rewritten)
 
     def _set_keys(self, data: Any, params: Mapping[str, str]) -> None:
         if not isinstance(data, dict):
@@ -123,7 +123,7 @@ class RewrittenYaml(_FromFile):
         for key, value in data.items():
             self._set_keys(value, params)
             if key in params:
-                data[key] = self._typed(params[key])
+                data[key] = self._convert(params[key])
 
     def _set_paths(self, data: Any, params: Mapping[str, str]) -> None:
         """Set values by their paths; one that is not there is added to a node's parameters."""
@@ -131,16 +131,16 @@ class RewrittenYaml(_FromFile):
         for path, value in params.items():
             keys = path.split(".")
             if path in there or "ros__parameters" in keys:
-                _set(data, keys, self._typed(value))
+                _set(data, keys, self._convert(value))
 
     def _with_values(self, data: Any, values: Mapping[str, str]) -> Any:
         if isinstance(data, dict):
             return {key: self._with_values(value, values) for key, value in data.items()}
         if isinstance(data, list):
             return [self._with_values(value, values) for value in data]
-        return self._typed(values[str(data)]) if str(data) in values else data
+        return self._convert(values[str(data)]) if str(data) in values else data
 
-    def _typed(self, text: str) -> Any:
+    def _convert(self, text: str) -> Any:
         """Return the value of a rewrite: true or false, a number if types are converted."""
         if self.convert_types:
             try:

@@ -59,9 +59,9 @@ def attach() -> None:
     for kind in _classes():
         if kind.__init__ is not object.__init__:  # type: ignore[misc]
             _keep(kind)
-    launch.frontend.Parser.parse_action = _placed(launch.frontend.Parser.parse_action)
+    launch.frontend.Parser.parse_action = _with_line(launch.frontend.Parser.parse_action)
     component = launch_ros.descriptions.ComposableNode
-    component.parse = classmethod(_placed_component(component.parse.__func__))
+    component.parse = classmethod(_component_with_line(component.parse.__func__))
     launch.frontend.Parser.load_parser_implementations()
     launch.frontend.Parser.load_launch_extensions()
     launch_xml.parser.ET = types.SimpleNamespace(
@@ -179,15 +179,15 @@ def _keep(kind: type) -> None:
     signature = inspect.signature(init)
 
     @functools.wraps(init)
-    def kept(self: Any, *args: Any, **kwargs: Any) -> None:
+    def keep(self: Any, *args: Any, **kwargs: Any) -> None:
         vars(self).setdefault("_made_of", (kind.__name__, (signature, args, kwargs)))
         vars(self).setdefault("_made_at", here())
         init(self, *args, **kwargs)
 
-    kind.__init__ = kept  # type: ignore[misc]
+    kind.__init__ = keep  # type: ignore[misc]
 
 
-def _placed(parse: Callable[..., Any]) -> Callable[..., Any]:
+def _with_line(parse: Callable[..., Any]) -> Callable[..., Any]:
     """Return a method that parses its last argument, an entity, whose line what it makes has."""
 
     @functools.wraps(parse)
@@ -198,7 +198,7 @@ def _placed(parse: Callable[..., Any]) -> Callable[..., Any]:
     return parsed
 
 
-def _placed_component(parse: Callable[..., Any]) -> Callable[..., Any]:
+def _component_with_line(parse: Callable[..., Any]) -> Callable[..., Any]:
     """Return the same for components, of which parsing gives the class and what one is made of."""
 
     @functools.wraps(parse)

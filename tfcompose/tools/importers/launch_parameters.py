@@ -60,13 +60,13 @@ def text_of(value: Any, context: RecordingContext) -> str:
         FailedError: if it cannot be evaluated.
     """
     if isinstance(value, launch.Substitution):
-        return str(evaluated(value.perform, context))
+        return str(evaluate(value.perform, context))
     if isinstance(value, (list, tuple)):
         return "".join(text_of(item, context) for item in value)
     return with_package(os.fspath(value)) if isinstance(value, os.PathLike) else str(value)
 
 
-def evaluated(evaluate: Callable[[Any], Any], context: RecordingContext) -> Any:
+def evaluate(evaluate: Callable[[Any], Any], context: RecordingContext) -> Any:
     """Evaluate something of launch, or of another package, in a context.
 
     Raises:
@@ -85,7 +85,7 @@ def optional_text(value: Any, context: RecordingContext) -> str | None:
     return None if value is None else text_of(value, context)
 
 
-def kept_text(value: Any, context: RecordingContext, *, typed: bool = False) -> str:
+def keep_text(value: Any, context: RecordingContext, *, typed: bool = False) -> str:
     """Return a value's text, with launch arguments as references.
 
     ``typed``: where an argument is all of it, it may be 10.0, which texts lose.
@@ -101,13 +101,13 @@ def _parts(value: Any, context: RecordingContext, *, typed: bool) -> list[Part]:
             return [Argument(name, known)]
         return [text_of(value, context)]
     if isinstance(value, PathJoinSubstitution):
-        return _joined([_parts(part, context, typed=typed) for part in value.substitutions])
+        return _join([_parts(part, context, typed=typed) for part in value.substitutions])
     if isinstance(value, (list, tuple)):
         return [part for item in value for part in _parts(item, context, typed=typed)]
     return [text_of(value, context)]
 
 
-def _joined(paths: Iterable[list[Part]]) -> list[Part]:
+def _join(paths: Iterable[list[Part]]) -> list[Part]:
     """Return the parts of a path, as ``os.path.join`` has it."""
     path: list[Part] = []
     for parts in paths:
@@ -201,7 +201,7 @@ def parameters_of(declared: Any, context: RecordingContext, at: Any) -> list[Any
                 read.append(dict(_flat(params, context, "", at)))
             elif isinstance(params, Parameter):
                 made_of = arguments_of(params)
-                read.append({text_of(made_of["name"], context): _described(made_of, context)})
+                read.append({text_of(made_of["name"], context): _describe(made_of, context)})
             else:
                 read.append(_parameter_file(params, context, at))
         except FailedError as error:
@@ -223,11 +223,11 @@ def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
     source = file_text(file)
     if "$(" not in source:
         return file
-    parts = evaluated(lambda _: parse_substitution(source), context)
-    return made_file(file, source, text_of(parts, context), at, context)
+    parts = evaluate(lambda _: parse_substitution(source), context)
+    return file_of_text(file, source, text_of(parts, context), at, context)
 
 
-def made_file(file: str, source: str, text: str, at: Any, context: RecordingContext) -> str:
+def file_of_text(file: str, source: str, text: str, at: Any, context: RecordingContext) -> str:
     """Return a placeholder path for the file that launch writes after substitutions.
 
     Raises:
@@ -238,7 +238,7 @@ def made_file(file: str, source: str, text: str, at: Any, context: RecordingCont
     unknown = set(re.findall(rf"{PACKAGE}\w+", text)) - set(re.findall(rf"{PACKAGE}\w+", source))
     for name in sorted(unknown):
         context.todo(at, f"{relative(file)} names {name}, a package that is not found here")
-    return context.made_file(file, text)
+    return context.file_of_text(file, text)
 
 
 def _flat(
@@ -265,7 +265,7 @@ def parameter_value(value: Any, context: RecordingContext) -> Any:
         FailedError: if launch would reject it.
     """
     if isinstance(value, ParameterValue):
-        return _described(arguments_of(value), context)
+        return _describe(arguments_of(value), context)
     if isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, launch.Substitution):
@@ -283,7 +283,7 @@ def parameter_value(value: Any, context: RecordingContext) -> Any:
     return text_of(value, context)
 
 
-def _described(made_of: Mapping[str, Any], context: RecordingContext) -> Any:
+def _describe(made_of: Mapping[str, Any], context: RecordingContext) -> Any:
     """Return the value of launch's ``ParameterValue``, with its type."""
     value, value_type = made_of["value"], made_of.get("value_type")
     if isinstance(value, (int, float)) and value_type in (None, type(value)):
@@ -295,25 +295,25 @@ def _described(made_of: Mapping[str, Any], context: RecordingContext) -> Any:
         return [_item(item, kind, context) for item in value]
     if value_type is None:
         return _read_as_yaml(value, context)
-    kept = _kept_with_type(value, value_type, context)
+    kept = _keep_with_type(value, value_type, context)
     if kept is not None:
         return kept
     if value_type is str:
         return with_files(text_of(value, context))
-    return evaluated(lambda _: _typed_by_launch(value, value_type, context), context)
+    return evaluate(lambda _: _type_by_launch(value, value_type, context), context)
 
 
 def _item(item: Any, kind: Any, context: RecordingContext) -> Any:
     value_type = str if isinstance(item, str) else kind
-    return _described({"value": item, "value_type": value_type}, context)
+    return _describe({"value": item, "value_type": value_type}, context)
 
 
-def _typed_by_launch(value: Any, value_type: Any, context: RecordingContext) -> Any:
+def _type_by_launch(value: Any, value_type: Any, context: RecordingContext) -> Any:
     normalized = normalize_typed_substitution(value, value_type)
     return perform_typed_substitution(context, normalized, value_type)
 
 
-def _kept_with_type(value: Any, value_type: Any, context: RecordingContext) -> str | None:
+def _keep_with_type(value: Any, value_type: Any, context: RecordingContext) -> str | None:
     """Return the text with arguments as references, if they have the value's type."""
     text = _parameter_text(value, context)
     argument = argument_of(text)
@@ -327,10 +327,10 @@ def _kept_with_type(value: Any, value_type: Any, context: RecordingContext) -> s
 
 
 def _parameter_text(value: Any, context: RecordingContext) -> str:
-    text = kept_text(value, context, typed=True)
+    text = keep_text(value, context, typed=True)
     if argument_of(text) or not arguments_in(text):
         return text
-    return kept_text(value, context)
+    return keep_text(value, context)
 
 
 def _read_as_yaml(value: Any, context: RecordingContext) -> Any:
@@ -342,7 +342,7 @@ def _read_as_yaml(value: Any, context: RecordingContext) -> Any:
     if files_in(text):
         return fill(text, Argument)
     names = arguments_in(text)
-    typed = _typed(str(text))
+    typed = _convert(str(text))
     if not names:
         return typed
     expected = scalar_of(str(text)) if argument_of(text) else str(text)
@@ -352,7 +352,7 @@ def _read_as_yaml(value: Any, context: RecordingContext) -> Any:
     return typed
 
 
-def _typed(text: str) -> Any:
+def _convert(text: str) -> Any:
     try:
         value = yaml.safe_load(text) if text else ""
     except yaml.YAMLError:

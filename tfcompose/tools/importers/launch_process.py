@@ -123,8 +123,8 @@ class LaunchPackages:
                 manifest = folder / "package.xml"
                 if not manifest.is_file():
                     continue
-                found = _NAME.search(manifest.read_text("utf-8", "replace"))
-                if found and found[1] == name:
+                match = _NAME.search(manifest.read_text("utf-8", "replace"))
+                if match and match[1] == name:
                     return str(folder)
         return None
 
@@ -194,7 +194,7 @@ def _watch(  # noqa: C901 (one hook after another)
         note(f"os.system({command!r})")
         return 0
 
-    def opened(file: Any, mode: str = "r", *args: Any, **more: Any) -> Any:
+    def open_file(file: Any, mode: str = "r", *args: Any, **more: Any) -> Any:
         path = with_package(os.fspath(file)) if isinstance(file, (str, os.PathLike)) else file
         if path == os.devnull:
             return plain_open(os.dup(null), mode, *args, **more)
@@ -218,11 +218,11 @@ def _watch(  # noqa: C901 (one hook after another)
         (subprocess, "check_output", lambda *a, **k: run(*a, **k).stdout),
         (subprocess, "getoutput", lambda argv, **k: run(argv, text=True, **k).stdout),
         (os, "popen", lambda argv, *_a, **_k: io.StringIO(run(argv, text=True).stdout)),
-        (builtins, "open", opened),
-        (io, "open", opened),
+        (builtins, "open", open_file),
+        (io, "open", open_file),
         (tempfile, "mktemp", saved.temporary),
-        (tempfile, "mkstemp", saved.described),
-        (tempfile, "NamedTemporaryFile", saved.named),
+        (tempfile, "mkstemp", saved.open_descriptor),
+        (tempfile, "NamedTemporaryFile", saved.open_named),
     ]
     for owner, name, hook in hooks:
         setattr(owner, name, hook)

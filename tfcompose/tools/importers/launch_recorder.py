@@ -44,9 +44,9 @@ from tfcompose.tools.importers.launch_objects import arguments_of, id_of, place_
 from tfcompose.tools.importers.launch_parameters import (
     describe,
     describe_condition,
-    evaluated,
+    evaluate,
     is_true,
-    kept_text,
+    keep_text,
     optional_text,
     parameter_value,
     parameters_of,
@@ -99,7 +99,7 @@ def description_of(path: str) -> Any:
         if path.endswith(".py"):
             return get_launch_description_from_python_launch_file(path)
         with objects.parsing(path):
-            root, parser = _parsed(path)
+            root, parser = _parse(path)
             return parser.parse_description(root)
     except (FailedError, MemoryError):
         raise
@@ -112,7 +112,7 @@ def description_of(path: str) -> Any:
         raise FailedError(text, objects.line_of(error, path)) from None
 
 
-def _parsed(path: str) -> tuple[Any, Any]:
+def _parse(path: str) -> tuple[Any, Any]:
     """Return the root of a launch file in another language, and its parser.
 
     Launch tries all its parsers, and tells of all their errors; here it is that of the language.
@@ -191,62 +191,62 @@ def _if_holds(
     """Execute what launch would if its condition holds; with every branch, in any case."""
     at = context.at = place_of(made)
     if condition is None:
-        _executed(made, execute, context)
+        _execute(made, execute, context)
         return
     when = when_of(condition, context) if context.every_branch else None
     if when:
         context.whens.append(f"({when})" if " or " in when or " and " in when else when)
         try:
-            _executed(made, execute, context)
+            _execute(made, execute, context)
         finally:
             context.whens.pop()
         return
     text = describe_condition(condition)
     try:
-        holds = bool(evaluated(condition.evaluate, context))
+        holds = bool(evaluate(condition.evaluate, context))
         if isinstance(condition, launch.conditions.LaunchConfigurationEquals):
             name = describe(arguments_of(condition)["launch_configuration_name"])
             context.decided |= {name} & context.declared.keys()
     except FailedError as error:
-        context.todo(at, f"{described(made)} if {text}: {error}")
+        context.todo(at, f"{describe_action(made)} if {text}: {error}")
         return
     if not holds and not context.every_branch:
-        context.record("skipped", at, text=f"{described(made)} only if {text}")
+        context.record("skipped", at, text=f"{describe_action(made)} only if {text}")
         return
     if context.every_branch:
-        context.todo(at, f"the condition of {described(made)}: {text}")
+        context.todo(at, f"the condition of {describe_action(made)}: {text}")
     context.conditions.append(text if holds else f"{text}, which does not hold")
     try:
-        _executed(made, execute, context)
+        _execute(made, execute, context)
     finally:
         context.conditions.pop()
 
 
-def _executed(made: Any, execute: Callable[[], None], context: RecordingContext) -> None:
+def _execute(made: Any, execute: Callable[[], None], context: RecordingContext) -> None:
     at = place_of(made)
     try:
         execute()
     except FailedError as error:
-        context.todo(at, f"{described(made)}: {error}")
+        context.todo(at, f"{describe_action(made)}: {error}")
     except (TypeError, ValueError, AttributeError, LookupError) as error:
         # what it was given is of another kind
-        context.todo(at, f"{described(made)}: {type(error).__name__}: {error}")
+        context.todo(at, f"{describe_action(made)}: {type(error).__name__}: {error}")
 
 
 def _let_launch(action: Any, context: RecordingContext) -> None:
     """Let an action do what it does, and visit what it gives."""
     if isinstance(action, launch.actions.ExecuteLocal):
         raise FailedError("it starts a process in a way that is not known here")
-    visit_all(evaluated(action.execute, context), context)
+    visit_all(evaluate(action.execute, context), context)
 
 
-def described(made: Any) -> str:
+def describe_action(made: Any) -> str:
     """Return what an action is, for people."""
     for kind, describe_it in _DESCRIBED:
         if isinstance(made, kind):
             return describe_it(arguments_of(made))
     if isinstance(made, launch.actions.IncludeLaunchDescription):
-        return f"the included {_shown_location(made)}"
+        return f"the included {_describe_location(made)}"
     if isinstance(made, launch.actions.EmitEvent):
         return f"the event {type(made.event).__name__}"
     return str(getattr(made, "NAME", type(made).__name__))
@@ -296,7 +296,7 @@ _DESCRIBED: tuple[tuple[type, Callable[[Mapping[str, Any]], str]], ...] = (
 
 
 def _declare(action: Any, context: RecordingContext) -> None:
-    evaluated(action.execute, context)
+    evaluate(action.execute, context)
     if context.depth > 1:
         return
     arguments, name = arguments_of(action), str(action.name)
@@ -326,7 +326,7 @@ def _variable_of(default: Any, context: RecordingContext) -> str:
 
 
 def _set_configuration(action: Any, context: RecordingContext) -> None:
-    evaluated(action.execute, context)
+    evaluate(action.execute, context)
     arguments = arguments_of(action)
     context.declared.pop(text_of(arguments.get("name", ""), context), None)
 
@@ -335,14 +335,14 @@ def _unset_variable(action: Any, context: RecordingContext) -> None:
     name = text_of(arguments_of(action)["name"], context)
     if context.is_inherited(name) or name not in os.environ:
         context.todo(place_of(action), f"the environment variable {name} is unset")
-    evaluated(action.execute, context)
+    evaluate(action.execute, context)
 
 
 def _append_variable(action: Any, context: RecordingContext) -> None:
     arguments = arguments_of(action)
     name = text_of(arguments["name"], context)
     if name in context.variables:
-        evaluated(action.execute, context)
+        evaluate(action.execute, context)
         return
     value = relative(with_package(text_of(arguments["value"], context)))
     context.todo(place_of(action), f"{value} is appended to the environment's {name}")
@@ -350,7 +350,7 @@ def _append_variable(action: Any, context: RecordingContext) -> None:
 
 def _set_parameter(action: Any, context: RecordingContext) -> None:
     arguments = arguments_of(action)
-    evaluated(action.execute, context)
+    evaluate(action.execute, context)
     name, value = text_of(arguments["name"], context), parameter_value(arguments["value"], context)
     if isinstance(value, str) and not isinstance(value, Text):
         value = yaml.safe_load(value)  # it goes onto the command line
@@ -358,7 +358,7 @@ def _set_parameter(action: Any, context: RecordingContext) -> None:
 
 
 def _set_sim_time(action: Any, context: RecordingContext) -> None:
-    evaluated(action.execute, context)
+    evaluate(action.execute, context)
     context.params.append({"use_sim_time": is_true(arguments_of(action)["value"], context)})
 
 
@@ -389,7 +389,7 @@ def _emit(action: Any, context: RecordingContext) -> None:
 
 
 def _leave_out(action: Any, context: RecordingContext) -> None:
-    context.todo(place_of(action), described(action))
+    context.todo(place_of(action), describe_action(action))
 
 
 def _ignore(_action: Any, _context: RecordingContext) -> None:
@@ -453,7 +453,7 @@ def _location_of(action: Any) -> Any:
     return arguments.get("launch_file_path") or arguments.get("launch_description") or source
 
 
-def _shown_location(action: Any) -> str:
+def _describe_location(action: Any) -> str:
     location = _location_of(action)
     parts = location if isinstance(location, (list, tuple)) else [location]
     return relative("".join(map(describe, parts)))
@@ -463,7 +463,7 @@ def _include(action: Any, context: RecordingContext) -> None:
     location = _location_of(action)
     if isinstance(location, LaunchDescriptionSource):
         raise FailedError("its source is not known here")
-    arguments = _given_arguments(action, context)
+    arguments = _set_arguments(action, context)
     if isinstance(location, launch.LaunchDescription):
         visit_all([location], context)
         return
@@ -483,18 +483,19 @@ def _include(action: Any, context: RecordingContext) -> None:
     include(os.path.abspath(path), context)  # noqa: PTH100 (pathlib keeps ..)
 
 
-def _given_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
+def _set_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
     """Set the arguments of an included file; return them with those that stand for themselves."""
     values: dict[str, str] = {}
     pairs = arguments_of(action).get("launch_arguments") or ()
     for name, value in pairs.items() if isinstance(pairs, Mapping) else pairs:
         try:
-            argument, kept = text_of(name, context), kept_text(value, context)
+            argument, kept = text_of(name, context), keep_text(value, context)
             text = text_of(value, context)
         except FailedError as error:
             # the file has a default for it, or says what it cannot do without
             context.todo(
-                place_of(action), f"the argument {describe(name)} of {described(action)}: {error}"
+                place_of(action),
+                f"the argument {describe(name)} of {describe_action(action)}: {error}",
             )
             continue
         values[argument] = kept
@@ -532,7 +533,7 @@ def _process(action: Any, context: RecordingContext) -> None:
         "process",
         place_of(action),
         argv=[
-            kept_text(argument, context)
+            keep_text(argument, context)
             for argument in (argv if is_of_package else arguments["cmd"])
         ],
         label=optional_text(arguments.get("name"), context),
@@ -559,7 +560,7 @@ def _container(action: Any, context: RecordingContext) -> None:
 def _record_node(action: Any, kind: str, context: RecordingContext, **more: Any) -> None:
     """Record a node with all that it is told."""
     arguments = arguments_of(action)
-    argv = [kept_text(argument, context) for argument in arguments.get("arguments") or ()]
+    argv = [keep_text(argument, context) for argument in arguments.get("arguments") or ()]
     ros_argv = [text_of(argument, context) for argument in arguments.get("ros_arguments") or ()]
     context.record(
         kind,
@@ -579,7 +580,7 @@ def _of_node(
     """Return what a node has, in its own process or in a container's."""
     global_rules = context.launch_configurations.get("ros_remaps", ())
     rules = [
-        (text_of(old, context), kept_text(new, context))
+        (text_of(old, context), keep_text(new, context))
         for old, new in arguments.get("remappings") or ()
     ]
     params = parameters_of(arguments.get("parameters"), context, place_of(action))
@@ -623,7 +624,7 @@ def _common(
             what[keyword.name] = _READERS[keyword.kind](arguments[keyword.name], context)
     for keyword in launch_keywords("text"):
         if keyword.name == _PREFIX and arguments.get(keyword.name) is None:
-            what |= _configured_prefix(keyword.attribute, arguments, context)
+            what |= _global_prefix(keyword.attribute, arguments, context)
     for keyword in launch_keywords("shutdown"):
         follows = arguments.get(keyword.name)
         follows = follows if isinstance(follows, (list, tuple)) else [follows]
@@ -638,7 +639,7 @@ def _common(
 _PREFIX = "prefix"
 
 
-def _configured_prefix(
+def _global_prefix(
     name: str, arguments: Mapping[str, Any], context: RecordingContext
 ) -> dict[str, str]:
     """Return the prefix that launch configurations set for all programs, or those of a filter."""
@@ -650,7 +651,7 @@ def _configured_prefix(
 
 def _texts(values: Any, context: RecordingContext) -> dict[str, str]:
     items = values.items() if isinstance(values, Mapping) else values or ()
-    return {text_of(key, context): kept_text(value, context) for key, value in items}
+    return {text_of(key, context): keep_text(value, context) for key, value in items}
 
 
 _OUTPUTS = frozenset({"screen", "log", "both", "own_log", "full"})

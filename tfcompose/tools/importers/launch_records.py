@@ -69,7 +69,7 @@ class LaunchRecording:
         more |= {"only_when": " and ".join(dict.fromkeys(self.whens))} if self.whens else {}
         self.records.append({"kind": kind, "at": at, **more, **what})
 
-    def made_file(self, source: str, text: str) -> str:
+    def file_of_text(self, source: str, text: str) -> str:
         """Keep the text that launch makes of a file; return the path that stands for it."""
         source = os.path.abspath(source)  # noqa: PTH100 (links stay)
         begin = source.rpartition("#")[0] if source in self.files else source

@@ -146,8 +146,8 @@ def _root(file: str) -> Element:
     try:
         root = read_xml(text, file)
     except RejectedError as error:
-        found = error.findings[0]
-        raise FailedError(found.message, found.span.line if found.span else 0) from None
+        finding = error.findings[0]
+        raise FailedError(finding.message, finding.span.line if finding.span else 0) from None
     if root.tag != "launch":
         raise FailedError(f"<{root.tag}> is no launch file")
     return root
@@ -155,27 +155,27 @@ def _root(file: str) -> Element:
 
 def _visit(element: Element, recording: Ros1Recording) -> None:
     """Do what an element says, if its condition holds."""
-    recording.at = (recording.file, element.at.line)
+    recording.at = (recording.file, element.span.line)
     at = recording.at
     try:
         when, holds = _condition(element, recording)
     except FailedError as error:
-        recording.todo(at, f"{_described(element)}: {error}")
+        recording.todo(at, f"{_describe(element)}: {error}")
         return
     text = element.attributes.get("if") or f"not {element.attributes.get('unless')}"
     if holds is False and not recording.every_branch:
-        recording.record("skipped", at, text=f"{_described(element)} only if {text}")
+        recording.record("skipped", at, text=f"{_describe(element)} only if {text}")
         return
     conditions, whens = list(recording.conditions), list(recording.whens)
     if when:
         recording.whens.append(when)
     elif holds is not None and recording.every_branch:
-        recording.todo(at, f"the condition of {_described(element)}: {text}")
+        recording.todo(at, f"the condition of {_describe(element)}: {text}")
         recording.conditions.append(text if holds else f"{text}, which does not hold")
     try:
         _read_element(element, recording)
     except FailedError as error:
-        recording.todo(at, f"{_described(element)}: {error}")
+        recording.todo(at, f"{_describe(element)}: {error}")
     finally:
         recording.conditions, recording.whens = conditions, whens
 
@@ -200,7 +200,7 @@ def _condition(element: Element, recording: Ros1Recording) -> tuple[str | None, 
     return None, (value in {"true", "1"}) is (name == "if")
 
 
-def _described(element: Element) -> str:
+def _describe(element: Element) -> str:
     attributes = element.attributes
     if element.tag == "node":
         return f"the node {attributes.get('pkg')}/{attributes.get('type')}"
@@ -275,17 +275,17 @@ class _Attributes:
 def _text(text: str, recording: Ros1Recording) -> str:
     """Return a text with its substitutions done; arguments stand for themselves where they may."""
     if text.startswith("$(eval ") and text.endswith(")"):
-        return _evaluated(text[len("$(eval ") : -1], recording)
+        return _evaluate(text[len("$(eval ") : -1], recording)
     parts: list[Part] = []
     position = 0
-    for found in _SUBSTITUTION.finditer(text):
-        parts += [text[position : found.start()], _substituted(found, recording)]
-        position = found.end()
+    for match in _SUBSTITUTION.finditer(text):
+        parts += [text[position : match.start()], _substitute(match, recording)]
+        position = match.end()
     return Text.of([*parts, text[position:]])
 
 
-def _substituted(found: re.Match[str], recording: Ros1Recording) -> Part:
-    kind, operands = found[1], found[2].split()
+def _substitute(match: re.Match[str], recording: Ros1Recording) -> Part:
+    kind, operands = match[1], match[2].split()
     name = operands[0] if operands else ""
     match kind:
         case "arg":
@@ -298,7 +298,7 @@ def _substituted(found: re.Match[str], recording: Ros1Recording) -> Part:
         case "anon":
             return name
         case "eval":
-            raise FailedError(f"{found[0]} is only part of a value")
+            raise FailedError(f"{match[0]} is only part of a value")
     value = recording.variables.get(name, os.environ.get(name, ""))
     if not value and kind == "optenv":
         return " ".join(operands[1:])
@@ -313,7 +313,7 @@ def _argument(name: str, recording: Ros1Recording) -> str:
     return recording.arguments[name]
 
 
-def _evaluated(expression: str, recording: Ros1Recording) -> str:
+def _evaluate(expression: str, recording: Ros1Recording) -> str:
     """Return what a Python expression gives, which names arguments."""
 
     def argument(name: str) -> Any:
@@ -382,12 +382,12 @@ def _parameter(element: _Attributes) -> tuple[str, Any]:
     if kind in {"str", "string"}:
         return name, text
     argument = argument_of(text)
-    if argument and scalar_of(argument.value) == _typed(argument.value):
+    if argument and scalar_of(argument.value) == _convert(argument.value):
         return name, text
-    return name, text if arguments_in(text) and not argument else _typed(str(text))
+    return name, text if arguments_in(text) and not argument else _convert(str(text))
 
 
-def _typed(text: str) -> Any:
+def _convert(text: str) -> Any:
     try:
         value = yaml.safe_load(text) if text else ""
     except yaml.YAMLError:

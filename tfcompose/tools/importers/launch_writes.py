@@ -57,7 +57,7 @@ class SavedFiles:
         made.seek(0, io.SEEK_END)
         return made
 
-    def named(
+    def open_named(
         self,
         mode: str = "w+b",
         *_: Any,
@@ -69,7 +69,7 @@ class SavedFiles:
         """Return a file with a name, as tempfile's NamedTemporaryFile does."""
         return self.open(self._name(suffix, prefix, dir), mode.replace("+", ""))
 
-    def described(
+    def open_descriptor(
         self,
         suffix: str | None = None,
         prefix: str | None = None,

@@ -17,7 +17,7 @@ from tfcompose.model.robot import value_of_word
 from tfcompose.spec.load.params import Word, load_params
 from tfcompose.tools.importers.draft import path_from
 from tfcompose.tools.importers.launch_records import PACKAGE
-from tfcompose.tools.importers.texts import MadeFile, Text, concatenated
+from tfcompose.tools.importers.texts import MadeFile, Text, concatenate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -36,7 +36,7 @@ _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MOST_BYTES = 16_000_000
 
 
-def named_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft) -> str | None:
+def node_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft) -> str | None:
     """Return the node that parameter files are written for, where that is one alone.
 
     None where none is named.
@@ -81,7 +81,7 @@ def params_of(
     of_files: _Sections = {}
     for index, param_set in enumerate(program.params):
         if not isinstance(param_set, str):
-            params = {key: brought(value, draft) for key, value in param_set.items()}
+            params = {key: bring_files(value, draft) for key, value in param_set.items()}
             by_node = [(full if index in program.exact else _ANY, params)]
         elif param_set.startswith(PACKAGE):
             left.append(f"the parameters of {param_set}: the package is not found here")
@@ -130,14 +130,14 @@ def _file_parameter(params: dict[str, Any]) -> list[str]:
     if not isinstance(params.get(FILE_KEY), (str, list)):
         return []
     value = params.pop(FILE_KEY)
-    text = concatenated(["'", value, "'"]) if isinstance(value, str) else flow(value)
-    return ["--ros-args", "-p", concatenated([f"{FILE_KEY}:=", text])]
+    text = concatenate(["'", value, "'"]) if isinstance(value, str) else flow(value)
+    return ["--ros-args", "-p", concatenate([f"{FILE_KEY}:=", text])]
 
 
-def brought(value: Any, draft: ImportDraft) -> Any:
+def bring_files(value: Any, draft: ImportDraft) -> Any:
     """Return a text with the path of a file that the source makes at its end as ours."""
     if isinstance(value, list):
-        return [brought(item, draft) for item in value]
+        return [bring_files(item, draft) for item in value]
     made = next((path for path in draft.made if str(value).endswith(path)), None)
     if made is None or not isinstance(value, str):
         return value

@@ -19,7 +19,7 @@ from tfcompose.model.plan.stock import STATE_PUBLISHER
 from tfcompose.model.robot import Edge, Robot
 from tfcompose.tools.importers.draft import pose_keys
 from tfcompose.tools.importers.robot_file import sensor_keys
-from tfcompose.tools.importers.sensors import recognised
+from tfcompose.tools.importers.sensors import recognise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -66,11 +66,11 @@ class Observed:
 
     def _edge(self, edge: EdgeState) -> None:
         stream, frames = edge.stream, self.draft.sections["frames"]
-        at = ("frames", edge.child)
+        path = ("frames", edge.child)
         if edge.child in frames:
             if edge.present is not False:
                 publisher = edge.publisher or "another publisher"
-                self.draft.todo(f"{publisher} publishes {edge.name} as well", None, at)
+                self.draft.todo(f"{publisher} publishes {edge.name} as well", None, path)
             return
         frames[edge.child] = {}  # its place is kept while its owner is named
         if stream.static:
@@ -97,7 +97,7 @@ class Observed:
         """Replace fixed frames by sensors whose presets have them, with one driver at most."""
         frames = self.draft.sections["frames"]
         for publisher in (DRIVER, TFCOMPOSE):
-            sensors, undecided = recognised(self._fixed(), library, publisher)
+            sensors, undecided = recognise(self._fixed_frames(), library, publisher)
             for sensor in sensors:
                 owners = {edge.child: frames[edge.child].get("owner") for edge in sensor.inside}
                 drivers = {owner for child, owner in owners.items() if child in sensor.sent} or {
@@ -116,9 +116,9 @@ class Observed:
                 if mount in frames:
                     self.draft.note(("frames", mount), note)
 
-    def _fixed(self) -> Robot:
+    def _fixed_frames(self) -> Robot:
         """Return the fixed frames that are in the draft as a robot."""
-        at, frames = Span(""), self.draft.sections["frames"]
+        span, frames = Span(""), self.draft.sections["frames"]
         edges = tuple(
             Edge(
                 parent=keys["parent"],
@@ -126,7 +126,7 @@ class Observed:
                 kind="static",
                 owner="",
                 pose=self._poses[child],
-                at=at,
+                span=span,
             )
             for child, keys in frames.items()
             if child in self._poses
@@ -134,7 +134,7 @@ class Observed:
         return Robot(
             "",
             "",
-            dict.fromkeys((edge.child for edge in edges), at),
+            dict.fromkeys((edge.child for edge in edges), span),
             edges=edges,
             links={},
             processes=(),
@@ -148,7 +148,7 @@ class Observed:
         """
         frames, mount = self.draft.sections["frames"], sensor.mount.child
         is_in_use = sensor.name in self.draft.sections["processes"]
-        new = self._renamed(sensor.name) if is_in_use else ""
+        new = self._rename_process(sensor.name) if is_in_use else ""
         own = {key: value for key, value in frames[mount].items() if key in {"owner", "static"}}
         pose = pose_keys(sensor.mount.pose, quaternion=True)
         keys = sensor_keys(sensor, pose, {}, new if driver == sensor.name else driver) | own
@@ -160,9 +160,9 @@ class Observed:
             del frames[edge.child]
             self.draft.brought.add(edge.child)
 
-    def _renamed(self, name: str) -> str:
+    def _rename_process(self, name: str) -> str:
         """Give a process another name, which a sensor has: its driver is often called as it is."""
-        sections, at = self.draft.sections, ("processes", name)
+        sections, path = self.draft.sections, ("processes", name)
         node = next(node for node, process in self._owners.items() if process == name)
         new = self.draft.free_name(f"{name}_driver")
         renamed = {}
@@ -172,7 +172,7 @@ class Observed:
             else:
                 renamed[process] = keys
         sections["processes"] = renamed
-        self.draft.notes["processes", new] = self.draft.notes.pop(at, [])
+        self.draft.notes["processes", new] = self.draft.notes.pop(path, [])
         for keys in (*sections["frames"].values(), *sections["sensors"].values()):
             keys |= {key: new for key in ("owner", "driver") if keys.get(key) == name}
         self._owners[node] = new
@@ -212,9 +212,9 @@ class Observed:
 
     def _notes(self, edge: EdgeState) -> Iterable[str]:
         where = self.where(edge.stream.gid)
-        found = _PID.search(where)
-        argv = self.words_of(int(found[1])) if found else ()
-        run = started_by(argv)
+        match = _PID.search(where)
+        argv = self.words_of(int(match[1])) if match else ()
+        run = parse_command_line(argv)
         if run:
             yield f"it runs here as: run: {flow(run)}"
         elif where:
@@ -267,7 +267,7 @@ def round_rate(rate_hz: float | None) -> float | None:
     return float(f"{math.floor(rate_hz / scale * 10) / 10 * scale:.6g}")
 
 
-def started_by(argv: Sequence[str]) -> dict[str, Any]:
+def parse_command_line(argv: Sequence[str]) -> dict[str, Any]:
     """Return the package, executable and arguments of a command line.
 
     Nothing where it is no package's program.
@@ -277,10 +277,10 @@ def started_by(argv: Sequence[str]) -> dict[str, Any]:
     rest = list(argv)
     if rest and posixpath.basename(rest[0]).startswith("python") and rest[1:]:
         rest.pop(0)
-    found = re.search(r"/lib/([^/]+)/([^/]+)$", rest[0]) if rest else None
-    if found is None:
+    match = re.search(r"/lib/([^/]+)/([^/]+)$", rest[0]) if rest else None
+    if match is None:
         return {}
     own = rest[1 : rest.index("--ros-args")] if "--ros-args" in rest else rest[1:]
     ros = rest[rest.index("--ros-args") :] if "--ros-args" in rest else []
-    keys: dict[str, Any] = {"package": found[1], "executable": found[2]}
+    keys: dict[str, Any] = {"package": match[1], "executable": match[2]}
     return keys | ({"args": [*own, *ros]} if own or ros else {})

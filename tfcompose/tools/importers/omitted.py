@@ -41,7 +41,7 @@ _UNUSED = ("<gazebo", "<transmission")
 _MATERIAL = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
-def omitted(document: Document) -> Notes:
+def omitted_notes(document: Document) -> Notes:
     """Return what is left out of each link and joint, by reading or by import.
 
     Of the robot itself under no name.
@@ -52,13 +52,13 @@ def omitted(document: Document) -> Notes:
     for element in document.root.children:
         if element.tag not in {"link", "joint"}:
             continue
-        at = (f"{element.tag}s", element.attributes.get("name", ""))
-        entries.append((element.at, at))
+        path = (f"{element.tag}s", element.attributes.get("name", ""))
+        entries.append((element.span, path))
         left_out = list(dict.fromkeys(_in_element(element, colours)))
         if left_out:
-            notes.setdefault(at, []).append(f"left out: {', '.join(left_out)}")
+            notes.setdefault(path, []).append(f"left out: {', '.join(left_out)}")
         if _has_no_ends(element):
-            notes.setdefault(at, []).append(
+            notes.setdefault(path, []).append(
                 "the source gives no lower and upper limit, and parsers take 0"
             )
     for (
@@ -165,13 +165,13 @@ def without_unused_blocks(robot: Robot) -> tuple[Robot, list[str]]:
             else []
         )
         if unknown:
-            notes.append(f"left out: {_named(element)}: {unknown[0].message}")
+            notes.append(f"left out: {_name(element)}: {unknown[0].message}")
         else:
             blocks.append(block)
     return replace(robot, blocks=tuple(blocks)), notes
 
 
-def _named(element: Element) -> str:
+def _name(element: Element) -> str:
     name = next((key for key in ("name", "reference") if key in element.attributes), None)
     return f'<{element.tag} {name}="{element.attributes[name]}">' if name else f"<{element.tag}>"
 
@@ -188,7 +188,7 @@ def with_material_names(robot: Robot) -> tuple[Robot, list[str]]:
             names[material.name] = name = _material_name(material.name, {*names.values()})
             if name != material.name:
                 notes.append(f"the material {name} is called {material.name!r} in the source")
-        if material.rgba and _bounded(material) != material.rgba:
+        if material.rgba and _clamp_colour(material) != material.rgba:
             colour = ", ".join(f"{part:g}" for part in material.rgba)
             notes.append(f"the colour {material.name} is {colour} in the source: parts are 0 to 1")
 
@@ -197,7 +197,7 @@ def with_material_names(robot: Robot) -> tuple[Robot, list[str]]:
             return drawn
         name = names.get(drawn.material.name, drawn.material.name)
         return replace(
-            drawn, material=replace(drawn.material, name=name, rgba=_bounded(drawn.material))
+            drawn, material=replace(drawn.material, name=name, rgba=_clamp_colour(drawn.material))
         )
 
     def link(body: Link) -> Link:
@@ -219,7 +219,7 @@ def _material_name(name: str, used_names: set[str]) -> str:
     return free
 
 
-def _bounded(material: Material) -> tuple[float, float, float, float] | None:
+def _clamp_colour(material: Material) -> tuple[float, float, float, float] | None:
     """Return the colour with parts from 0 to 1."""
     if material.rgba is None:
         return None

@@ -29,7 +29,7 @@ class Description:
     args: Mapping[str, str] = field(default_factory=dict)
     text: str = ""
     prefix: str = ""
-    at: Span | None = None
+    span: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Program:
     parameters that are given under the node's full name, others are given to every node.
     """
 
-    at: Span | None
+    span: Span | None
     package: str | None = None
     executable: str | None = None
     argv: tuple[str, ...] = ()

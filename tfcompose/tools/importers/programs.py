@@ -19,16 +19,16 @@ from tfcompose.foundation.yaml_text import Bare
 from tfcompose.tools.importers.command_lines import with_ros_arguments
 from tfcompose.tools.importers.draft import where
 from tfcompose.tools.importers.launch_records import PACKAGE
-from tfcompose.tools.importers.node_params import MOST_BYTES, brought, named_in_files, params_of
+from tfcompose.tools.importers.node_params import MOST_BYTES, bring_files, node_in_files, params_of
 from tfcompose.tools.importers.program import CONTAINERS, JOINT_PUBLISHERS
-from tfcompose.tools.importers.robot_settings import isolated
+from tfcompose.tools.importers.robot_settings import is_isolated
 from tfcompose.tools.importers.static_transforms import (
     PROGRAM,
     ArgumentsRefusedError,
     reader_of,
     static_transform,
 )
-from tfcompose.tools.importers.texts import concatenated, partition
+from tfcompose.tools.importers.texts import concatenate, partition
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,33 +66,33 @@ def add_program(draft: ImportDraft, program: Program, target: Target) -> str | N
 
 
 def _add_transform(draft: ImportDraft, program: Program) -> None:
-    at = program.at
+    span = program.span
     moved = dict(program.remap)
     reader = program.reader or reader_of(program.argv)
     try:
         transform = static_transform(program.argv, reader)
     except ArgumentsRefusedError as error:
         draft.todo(
-            f"{PROGRAM} {' '.join(program.argv)}: {error}", at, advice="write the frame by hand"
+            f"{PROGRAM} {' '.join(program.argv)}: {error}", span, advice="write the frame by hand"
         )
         return
-    notes = [where(at, transform.order)]
+    notes = [where(span, transform.order)]
     keys = transform.keys()
     entry = ("frames", transform.child)
-    draft.publishers.setdefault(transform.child, at)
+    draft.publishers.setdefault(transform.child, span)
     if draft.is_adopted and transform.child not in draft.sections["frames"]:
         keys |= {"owner": _add_external(draft, program), "static": True}
-    added = draft.frame(transform.parent, transform.child, keys, at, *notes)
-    if added and not isolated(draft, moved, program.namespace):
+    added = draft.frame(transform.parent, transform.child, keys, span, *notes)
+    if added and not is_isolated(draft, moved, program.namespace):
         remaps = ", ".join(f"{old} → {new}" for old, new in moved.items())
         draft.todo(
             f"the publisher is remapped: {remaps}",
-            at,
+            span,
             entry,
             advice="ros: {namespace: …, isolate: topics}",
         )
     for message in program.todo:
-        draft.todo(message, at, entry)
+        draft.todo(message, span, entry)
 
 
 def _add_external(draft: ImportDraft, program: Program) -> str:
@@ -101,13 +101,13 @@ def _add_external(draft: ImportDraft, program: Program) -> str:
     if program.name is None:
         draft.todo(
             f"{PROGRAM} has another node name at each start",
-            program.at,
+            program.span,
             advice="name its node in the launch file, or hand its edge over first",
         )
     node = "/".join(("", *filter(None, (namespace, program.name or PROGRAM))))
     name = draft.free_name(program.name or PROGRAM)
     keys = {"external": True} | ({} if node == f"/{name}" else {"node": node})
-    return draft.process(name, keys, where(program.at))
+    return draft.process(name, keys, where(program.span))
 
 
 def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
@@ -130,7 +130,7 @@ def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
         else _JOINTS_HZ
     )
     simulate: dict[str, Any] = {"joints": zeros or "zero", "rate": _hertz(rate)}
-    notes = [where(program.at, f"in the place of {program.executable}")]
+    notes = [where(program.span, f"in the place of {program.executable}")]
     name = draft.process(
         program.name or program.executable or "joints", {"simulate": simulate}, *notes
     )
@@ -143,12 +143,12 @@ def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
         if key != "rate" and not key.startswith("zeros.") and key != "use_sim_time"
     ]
     for key in left:
-        draft.todo(f"{program.executable}: the parameter {key}", program.at, entry)
+        draft.todo(f"{program.executable}: the parameter {key}", program.span, entry)
     for message in (
         *program.todo,
         *(f"parameters of {file}" for file in program.params if isinstance(file, str)),
     ):
-        draft.todo(message, program.at, entry)
+        draft.todo(message, program.span, entry)
     return name
 
 
@@ -157,10 +157,12 @@ def _hertz(value: float) -> Any:
 
 
 def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
-    at, todo, advice = program.at, list(program.todo), ""
-    program = replace(program, argv=tuple(brought(argument, draft) for argument in program.argv))
+    span, todo, advice = program.span, list(program.todo), ""
+    program = replace(
+        program, argv=tuple(bring_files(argument, draft) for argument in program.argv)
+    )
     source_name = program.name
-    if not program.name and program.package and (name := named_in_files(program.params, draft)):
+    if not program.name and program.package and (name := node_in_files(program.params, draft)):
         program = replace(program, name=name)
     usual = (
         _usual_name(program.package)
@@ -179,9 +181,9 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     keeps_name = not source_name and _keeps_its_name(program)
     params = params_of(program, target, program.name or name, draft, keeps_name=keeps_name)
     program = replace(program, argv=(*program.argv, *params.argv))
-    draft.clocks.append((name, params.clock, at))
+    draft.clocks.append((name, params.clock, span))
     keys = _way(program)
-    notes = [where(at)]
+    notes = [where(span)]
     if keeps_name:
         own = {"params": params.own} if params.own else {}
         keys["nodes"] = {program.name or usual or name: own}
@@ -198,23 +200,23 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     section = "containers" if program.loads else "processes"
     draft.process(name, keys, *(note for note in notes if note), section=section)
     for argument in _texts((*program.argv, *program.env.values())):
-        if PACKAGE in argument and not _is_literal(argument, at, draft):
+        if PACKAGE in argument and not _is_literal(argument, span, draft):
             todo.append(f"{argument} is in a package that is not found here: write its path")
             advice = "--package NAME=FOLDER, or source the workspace's setup file"
     for message in (*todo, *params.left):
-        draft.todo(message, at, (section, name), advice)
+        draft.todo(message, span, (section, name), advice)
     if program.description is not None:
-        draft.todo("the parameter robot_description", at, (section, name), _FROM_TOPIC)
+        draft.todo("the parameter robot_description", span, (section, name), _FROM_TOPIC)
     return name
 
 
-def _is_literal(text: str, at: Span | None, draft: ImportDraft) -> bool:
+def _is_literal(text: str, span: Span | None, draft: ImportDraft) -> bool:
     """Whether the source has the word's addresses of packages itself, as the program reads them.
 
     What the source looks up in a package that is not found has such an address too.
     """
     try:
-        source = draft.reach.read(at.file, MOST_BYTES) if at else b""
+        source = draft.reach.read(span.file, MOST_BYTES) if span else b""
     except (OutsideError, OSError):
         return False
     return all(address.encode() in source for address in re.findall(rf"{PACKAGE}\w+", text))
@@ -282,7 +284,7 @@ def _texts(argv: Sequence[Any]) -> list[str]:
 def _run(program: Program) -> Any:
     """Return what ``run`` says of the program."""
     if program.shell:
-        return concatenated(program.argv, " ")
+        return concatenate(program.argv, " ")
     if program.package is not None:
         run: dict[str, Any] = {"package": program.package, "executable": program.executable}
         return run | ({"args": list(program.argv)} if program.argv else {})

@@ -16,11 +16,11 @@ from tfcompose.foundation.yaml_text import comment, dedent_block, entry, section
 from tfcompose.tools.importers.draft import robot_name
 from tfcompose.tools.importers.omitted import (
     angles,
-    omitted,
+    omitted_notes,
     with_material_names,
     without_unused_blocks,
 )
-from tfcompose.tools.importers.sensors import recognised
+from tfcompose.tools.importers.sensors import recognise
 from tfcompose.tools.importers.values import RobotFileValues, rotation
 from tfcompose.tools.importers.yaml_text import without_expressions
 
@@ -74,8 +74,8 @@ def put_into(draft: ImportDraft, imported: Imported) -> None:
     writer = _Writer(imported)
     for title, entries in writer.sections().items():
         draft.sections[title].update(entries)
-    for at, notes in writer.notes.items():
-        draft.note(at, *notes)
+    for path, notes in writer.notes.items():
+        draft.note(path, *notes)
     draft.brought |= writer.brought
     draft.base = draft.base or writer.base()
 
@@ -87,10 +87,10 @@ class _Writer:
         self.imported, self.robot = imported, imported.robot
         self.values = RobotFileValues(imported.rpy, imported.robot, imported.target)
         self.notes: dict[Entry, list[str]] = {
-            at: list(notes) for at, notes in imported.notes.items()
+            path: list(notes) for path, notes in imported.notes.items()
         }
         self.brought = {edge.child for sensor in imported.sensors for edge in sensor.edges}
-        self.fixed = self._fixed()
+        self.fixed = self._fixed_edges()
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections in the order of the language; ``notes`` are complete then."""
@@ -148,7 +148,7 @@ class _Writer:
         if notes:
             self.notes.setdefault((title, name), []).extend(notes)
 
-    def _fixed(self) -> dict[str, Edge]:
+    def _fixed_edges(self) -> dict[str, Edge]:
         """Return the edges that do not move and are no sensor's, by child.
 
         Of several to one child, the first.
@@ -312,7 +312,7 @@ def _value(text: str) -> Any:
     return text
 
 
-def imported(
+def import_document(
     document: Document,
     target: Target,
     name: str,
@@ -326,8 +326,8 @@ def imported(
     """
     robot, unused = without_unused_blocks(with_hardware(document.robot))
     robot, renamed = with_material_names(robot)
-    sensors, undecided = recognised(robot, library) if library else ([], {})
-    notes = omitted(document)
+    sensors, undecided = recognise(robot, library) if library else ([], {})
+    notes = omitted_notes(document)
     for mount, note in undecided.items():
         notes.setdefault(("frames", mount), []).append(note)
     name = name or robot_name(robot.name)
@@ -365,10 +365,10 @@ def with_findings(
 def _faults(compiled: Compiled) -> Iterable[str]:
     """Yield what lint finds in the result, each rule once: these are faults of the source."""
     by_code: dict[str, list[Finding]] = {}
-    for finding in compiled.found:
+    for finding in compiled.findings:
         by_code.setdefault(finding.code, []).append(finding)
     if by_code:
         yield "findings of lint, which the source has too:"
-    for code, found in by_code.items():
-        more = f" (and {len(found) - 1} more)" if found[1:] else ""
-        yield f"{code}: {found[0].message}{more}"
+    for code, findings in by_code.items():
+        more = f" (and {len(findings) - 1} more)" if findings[1:] else ""
+        yield f"{code}: {findings[0].message}{more}"

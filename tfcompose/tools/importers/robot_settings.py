@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.processes import FILE_KEY
 from tfcompose.model.robot import BUILT_IN
-from tfcompose.tools.importers.texts import argument_of, concatenated
+from tfcompose.tools.importers.texts import argument_of, concatenate
 from tfcompose.tools.importers.yaml_text import ExpressionText
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def one_clock(draft: ImportDraft) -> None:
 
 def _without_clock(draft: ImportDraft) -> None:
     """Leave the clock to the robot, but where a parameter file has one too."""
-    for keys in draft.started().values():
+    for keys in draft.started_entries().values():
         params = keys.get("params", {})
         if FILE_KEY not in params and params.pop("use_sim_time", None) and not params:
             del keys["params"]
@@ -50,9 +50,9 @@ def _without_clock(draft: ImportDraft) -> None:
 def _name_clockless(draft: ImportDraft) -> None:
     """Say which nodes have no clock in the source: here they have the robot's."""
     nodes = {
-        name: at
-        for name, clock, at in draft.clocks
-        if clock is None and _takes_settings(draft.started()[name].get("run", {}))
+        name: span
+        for name, clock, span in draft.clocks
+        if clock is None and _takes_settings(draft.started_entries()[name].get("run", {}))
     }
     if nodes:
         message = f"the source sets no use_sim_time for {', '.join(nodes)}: here they have"
@@ -79,7 +79,7 @@ def is_setting(draft: ImportDraft, name: str, value: str) -> bool:
     return allowed and draft.sections["ros"].setdefault(_SETTINGS[name], wanted) == wanted
 
 
-def isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | None) -> bool:
+def is_isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | None) -> bool:
     """Return whether remappings keep TF, or move it below the draft's namespace."""
     new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
     if any(name != topic.strip("/") for topic, name in new.items()):
@@ -99,7 +99,7 @@ def one_namespace(draft: ImportDraft) -> None:
     space = ros.get("namespace")
     if not space:
         return
-    for name, keys in draft.started().items():
+    for name, keys in draft.started_entries().items():
         if name in BUILT_IN:
             continue
         own = keys.pop("namespace", "")
@@ -108,7 +108,7 @@ def one_namespace(draft: ImportDraft) -> None:
         if own.startswith(f"{space}/"):
             keys["namespace"] = own[len(space) + 1 :]
         elif own != space:
-            keys["namespace"] = concatenated(["/", own])
+            keys["namespace"] = concatenate(["/", own])
             if ros.get("isolate"):
                 message = f"{name} is not in {space}: its /tf is the robot's, {space}/tf"
                 draft.todo(message, None, draft.entry_of(name), SEVERAL)

@@ -22,7 +22,7 @@ from tfcompose.compiler.resolve.poses import rotation_of
 from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE, fill_name, holds
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.geometry import Pose, angle_between
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.spec.language.pose import ROTATIONS
 from tfcompose.spec.language.preset import SensorKind
 
@@ -106,7 +106,7 @@ class _FrameMatch:
     tells: bool
 
 
-def recognised(
+def recognise(
     robot: Robot, library: Library, publisher: str = TFCOMPOSE
 ) -> tuple[list[Recognised], dict[str, str]]:
     """Return the sensors, and a note for each mount where none was decided on.
@@ -127,7 +127,7 @@ def recognised(
             for rival in fits
             if rival.quality[:3] == fit.quality[:3] and rival.sensor.mount == fit.sensor.mount
         ]
-        chosen = search.chosen(rivals)
+        chosen = search.choose(rivals)
         used_frames |= frames
         if chosen:
             sensors.append(chosen)
@@ -137,7 +137,7 @@ def recognised(
                 fit.sensor.name, fit.sensor.mount, presets
             )
     used_frames |= {above for frame in used_frames for above in search.above(frame)}
-    for mount, presets in search.named():
+    for mount, presets in search.edges_naming_presets():
         if mount.child not in used_frames:
             undecided[mount.child] = _question(_sensor_name(mount.child), mount, presets)
             used_frames |= {mount.child, *search.below(mount.child), *search.above(mount.child)}
@@ -147,7 +147,9 @@ def recognised(
 
 def _question(name: str, mount: Edge, presets: list[str]) -> str:
     first, *more = dict.fromkeys(presets)
-    what = f"is it one of {listed([first, *more], _MOST_NAMED)}?" if more else f"is it {first}?"
+    what = (
+        f"is it one of {list_names([first, *more], _MOST_NAMED)}?" if more else f"is it {first}?"
+    )
     entry = f"sensors: {{{name}: {{preset: {'…' if more else first}, parent: {mount.parent}}}}}"
     return f"{what} If so, write {entry}, with its pose, in the place of these frames"
 
@@ -203,7 +205,7 @@ class _Search:
             except RejectedError:
                 continue  # lint reports what is wrong with it
 
-    def chosen(self, rivals: list[_Fit]) -> Recognised | None:
+    def choose(self, rivals: list[_Fit]) -> Recognised | None:
         """Return the equally good fit that other facts single out, or None."""
         rivals = [rival for rival in rivals if not self.other_model(rival.sensor)]
         if not rivals:
@@ -226,7 +228,7 @@ class _Search:
             return named[0]
         return generic[0] if generic and not named else None
 
-    def named(self) -> list[tuple[Edge, list[str]]]:
+    def edges_naming_presets(self) -> list[tuple[Edge, list[str]]]:
         """Return the edges whose frame, or a mesh on it, names presets, with these.
 
         The most exact names first.
@@ -332,7 +334,7 @@ class _Search:
             if self.publisher == DRIVER and not any(frame.driver for frame in wanted.values()):
                 continue
             names = {own_mount: mount.child} if has_own_names else {}
-            found = self._matched(preset, sensor, wanted, names, has_own_names=has_own_names)
+            found = self._match_frames(preset, sensor, wanted, names, has_own_names=has_own_names)
             inside = found.values()
             if len(found) < len(wanted) or not any(match.tells for match in inside):
                 continue
@@ -375,7 +377,7 @@ class _Search:
         at = {"xyz": own.xyz} if own.xyz is not None else {}
         return frame.model_copy(update={"parent": own.parent, **at, **turned})
 
-    def _matched(
+    def _match_frames(
         self,
         preset: PresetSpec,
         sensor: str,

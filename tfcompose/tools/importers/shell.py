@@ -267,17 +267,17 @@ class _ShellReader:
             return self._unknown(_closing(rest), unknown)
         braced = re.match(r"\$\{([A-Za-z_][A-Za-z0-9_]*)(?::?-([^}${]*))?\}", rest)
         plain = re.match(r"\$([A-Za-z_][A-Za-z0-9_]*|[0-9@*#?$!])", rest)
-        found = braced or plain
-        if found is None:
+        match = braced or plain
+        if match is None:
             if rest.startswith("${"):
                 end = rest.find("}")
                 return self._unknown(end + 1 if end > 0 else len(rest), unknown)
             self._step()
             return "$"
-        value = self.variables.get(found[1], braced[2] if braced else None)
+        value = self.variables.get(match[1], braced[2] if braced else None)
         if value is None:
-            return self._unknown(found.end(), unknown)
-        self._step(found.end())
+            return self._unknown(match.end(), unknown)
+        self._step(match.end())
         return value
 
     def _unknown(self, length: int, unknown: list[str]) -> str:
@@ -293,8 +293,8 @@ class _ShellReader:
 
 def _first_word(text: str) -> int:
     """Return where the first word begins, behind blank lines and comments."""
-    found = re.match(r"(?:\s|#[^\n]*\n|\\\n)*", text)
-    return found.end() if found else 0
+    match = re.match(r"(?:\s|#[^\n]*\n|\\\n)*", text)
+    return match.end() if match else 0
 
 
 def _closing(text: str) -> int:
@@ -401,10 +401,10 @@ class _Script:
 
     def _export(self, command: ShellCommand, argv: list[str], variables: dict[str, str]) -> None:
         for argument in argv:
-            found = _ASSIGNMENT.fullmatch(argument)
-            if found and not command.unknown:
-                variables[found[1]] = self.environment[found[1]] = found[2]
-            elif found:
+            match = _ASSIGNMENT.fullmatch(argument)
+            if match and not command.unknown:
+                variables[match[1]] = self.environment[match[1]] = match[2]
+            elif match:
                 self._todo(command, "only a shell knows the value")
             elif _NAME.fullmatch(argument) and argument in variables:
                 self.environment[argument] = variables[argument]
@@ -437,10 +437,10 @@ def _assignments(argv: list[str]) -> tuple[dict[str, str], list[str]]:
     """Return the variables that are set in front of a command, and the command."""
     variables_set: dict[str, str] = {}
     for index, argument in enumerate(argv):
-        found = _ASSIGNMENT.fullmatch(argument)
-        if found is None:
+        match = _ASSIGNMENT.fullmatch(argument)
+        if match is None:
             return variables_set, argv[index:]
-        variables_set[found[1]] = found[2]
+        variables_set[match[1]] = match[2]
     return variables_set, []
 
 

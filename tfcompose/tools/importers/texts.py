@@ -86,7 +86,7 @@ def _fill(part: Part, kind: type[Argument | FileText]) -> Part:
     return _value(part) if isinstance(part, kind) else part
 
 
-def concatenated(texts: Iterable[str], separator: str = "") -> str:
+def concatenate(texts: Iterable[str], separator: str = "") -> str:
     """Return texts as one, with a separator between them."""
     parts: list[Part] = []
     for index, text in enumerate(texts):

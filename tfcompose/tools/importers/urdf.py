@@ -12,7 +12,7 @@ from tfcompose.foundation.findings import RejectedError
 from tfcompose.model.plan.stock import STATE_PUBLISHER
 from tfcompose.tools.importers.draft import path_from, where
 from tfcompose.tools.importers.launch_records import PACKAGE
-from tfcompose.tools.importers.robot_file import imported, put_into
+from tfcompose.tools.importers.robot_file import import_document, put_into
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -52,7 +52,7 @@ def add_descriptions(
         elif draft.sections["links"]:
             draft.todo(
                 "a second robot_state_publisher with a URDF",
-                described.at,
+                described.span,
                 advice="parts: {NAME: {urdf: FILE}}",
             )
         else:
@@ -72,10 +72,10 @@ def _add_external_part(draft: ImportDraft, described: Description, workshop: Wor
         address = file if described.text else path_from(workshop.target, file)
         prefix = {"prefix": described.prefix} if described.prefix else {}
         draft.sections["parts"][part] = {"urdf": address, **prefix}
-        draft.note(("parts", part), where(described.at, "what robot_state_publisher is given"))
+        draft.note(("parts", part), where(described.span, "what robot_state_publisher is given"))
         draft.has_unknown_frames = True
-    draft.publishers[part] = described.at
-    owner = draft.process(STATE_PUBLISHER, {"external": True}, where(described.at))
+    draft.publishers[part] = described.span
+    owner = draft.process(STATE_PUBLISHER, {"external": True}, where(described.span))
     draft.sections["parts"][part]["owner"] = owner
 
 
@@ -90,7 +90,7 @@ def _add_part(draft: ImportDraft, described: Description, workshop: Workshop) ->
     if package:
         address = f"{PACKAGE}{package}/{posixpath.relpath(path, folder)}"
         draft.sections["packages"][package] = workshop.target.from_folder(folder)
-    elif found := _installed(path, workshop.packages):
+    elif found := _installed_path(path, workshop.packages):
         address = found
     else:
         address = path if path.startswith(PACKAGE) else path_from(workshop.target, path)
@@ -100,10 +100,10 @@ def _add_part(draft: ImportDraft, described: Description, workshop: Workshop) ->
     draft.has_unknown_frames = True
     name = posixpath.basename(path).partition(".")[0].replace("-", "_") or "robot"
     draft.sections["parts"][name] = keys
-    draft.note(("parts", name), where(described.at, "what robot_state_publisher is given"))
+    draft.note(("parts", name), where(described.span, "what robot_state_publisher is given"))
 
 
-def _installed(path: str, packages: Packages) -> str:
+def _installed_path(path: str, packages: Packages) -> str:
     """Return the address of a file in a package that is installed, empty for any other."""
     for prefix in packages.disk.prefixes if packages.disk else ():
         share = prefix.rstrip("/") + "/share/"
@@ -119,20 +119,22 @@ def _add_links(draft: ImportDraft, described: Description, workshop: Workshop) -
         own = replace(packages.disk, read=lambda _: text)
         packages, file = Packages(own, packages.named, packages.advice), _TEXT
     elif file.startswith(PACKAGE):
-        draft.todo(f"the description {file}: its package is not found here", described.at)
+        draft.todo(f"the description {file}: its package is not found here", described.span)
         return
     elif not draft.reach.allows(file):
-        draft.todo(f"the description {file}: it may not be read", described.at, advice=_OUTSIDE)
+        draft.todo(f"the description {file}: it may not be read", described.span, advice=_OUTSIDE)
         return
     try:
         document = read_urdf(file, packages)
     except RejectedError as error:
-        draft.todo(f"the description: {error.findings[0].message}", described.at)
+        draft.todo(f"the description: {error.findings[0].message}", described.span)
         return
     for finding in document.findings():
         if finding.severity == "error":
-            draft.todo(f"the description has {finding.code}: {finding.message}", described.at)
-    robot = imported(document, workshop.target, draft.robot, packages.local, workshop.library)
+            draft.todo(f"the description has {finding.code}: {finding.message}", described.span)
+    robot = import_document(
+        document, workshop.target, draft.robot, packages.local, workshop.library
+    )
     if described.prefix:
         draft.sections["ros"]["frame_prefix"] = described.prefix
     put_into(draft, robot)

@@ -29,25 +29,25 @@ def without_expressions(
         if isinstance(part, str)
     )
     lines = entry("vars", {"dollar": "$"}) if any("${" in part for part in literals) else []
-    return _escaped(sections), lines
+    return _escape(sections), lines
 
 
-def _escaped(value: Any) -> Any:
+def _escape(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _escaped(item) for key, item in value.items()}
+        return {key: _escape(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_escaped(item) for item in value]
+        return [_escape(item) for item in value]
     if not isinstance(value, str):
         return value
     if isinstance(value, ExpressionText):
         return f"${{{value}}}"
     if isinstance(value, Text):
-        return "".join(map(_escaped_part, value.parts))
+        return "".join(map(_escape_part, value.parts))
     text = value.replace("${", "${dollar}{")
     return Bare(f'"{text}"') if text != value and isinstance(value, Bare) else type(value)(text)
 
 
-def _escaped_part(part: Part) -> str:
+def _escape_part(part: Part) -> str:
     match part:
         case Argument(name=name):
             return f"${{args.{name}}}"

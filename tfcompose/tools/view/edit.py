@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
     from tfcompose.foundation.geometry import Quaternion
     from tfcompose.model.robot import Edge, Robot
-    from tfcompose.spec.load import Path, Place, Source
+    from tfcompose.spec.load import Location, Path, Source
     from tfcompose.tools.view.rotations import Numbers
 
 #: What a new number may be off, in metres or radians, for the sake of a short text; at a lever it
@@ -68,7 +68,7 @@ class Elsewhere:
     """
 
     reason: str
-    at: Span
+    span: Span
     entry: Path
     values: Mapping[str, str | None]
 
@@ -101,7 +101,7 @@ class Mount:
         name = str(self.entry[-1]) if self.entry[2:3] == ("frames",) else self.place
         return is_optical(name)
 
-    def given(self, parent_from_child: Pose) -> Pose:
+    def pose_in_file(self, parent_from_child: Pose) -> Pose:
         """Return the pose that the file has to give for the edge to have this one."""
         return self.parent_from_base.inverse() @ parent_from_child @ self.child_from_place
 
@@ -160,16 +160,16 @@ def change_of(
         number.path: number.numbers for number in robot.source_numbers if not number.in_part
     }
     return _MountEditor(mount, source, texts, tolerance, computed).of(
-        mount.given(parent_from_child)
+        mount.pose_in_file(parent_from_child)
     )
 
 
 class _ElsewhereError(Exception):
-    """A number is not the mount's own; it stands at ``at``."""
+    """A number is not the mount's own; it stands at ``span``."""
 
-    def __init__(self, reason: str, at: Span) -> None:
+    def __init__(self, reason: str, span: Span) -> None:
         self.reason = reason
-        self.at = at
+        self.span = span
         super().__init__(reason)
 
 
@@ -180,12 +180,12 @@ class _MountEditor:
     texts: Mapping[str, str]
     tolerance: float
     computed: Mapping[Path, tuple[float, ...]]
-    _raw: dict[str, Place] = field(default_factory=dict)
+    _raw: dict[str, Location] = field(default_factory=dict)
 
     def of(self, new: Pose) -> MountEdits | Elsewhere:
         """Return how the given pose becomes the new one."""
         mount = self.mount
-        old = mount.given(mount.edge.pose)
+        old = mount.pose_in_file(mount.edge.pose)
         moves = any(abs(a - b) > self.tolerance for a, b in zip(new.xyz, old.xyz, strict=True))
         rotates = angle_between(new.quat_xyzw, old.quat_xyzw) > self.tolerance
         if not moves and not rotates:
@@ -203,13 +203,13 @@ class _MountEditor:
     ) -> Elsewhere:
         entry, measured = self.mount.entry, self.mount.edge.calibration is not None
         if self._is_in_part():
-            return Elsewhere(error.reason, error.at, (), {})
+            return Elsewhere(error.reason, error.span, (), {})
         values: dict[str, str | None] = {"calibration": None} if measured else {}
         if moves or measured:
             values["xyz"] = self._xyz(new)
         if rotates or measured:
             values["rpy"] = self._rpy(new.quat_xyzw)
-        return Elsewhere(error.reason, error.at, entry, values)
+        return Elsewhere(error.reason, error.span, entry, values)
 
     def _is_in_part(self) -> bool:
         return self.mount.entry[:1] == ("parts",) and len(self.mount.entry) > _PART
@@ -219,25 +219,25 @@ class _MountEditor:
         edge, measured = self.mount.edge, self.mount.edge.calibration
         if measured is not None:
             raise _ElsewhereError(
-                f"the pose is measured, in the calibration {measured.at.file}", measured.at
+                f"the pose is measured, in the calibration {measured.span.file}", measured.span
             )
         if self._is_in_part():
             reason = f"the pose is given in the part {self.mount.entry[1]}"
-            if edge.at.file.endswith((".yaml", ".yml")):
+            if edge.span.file.endswith((".yaml", ".yml")):
                 reason += (
-                    f"; tfcompose view {shlex.quote(edge.at.file)} --edit changes it for all that"
-                    " use the file"
+                    f"; tfcompose view {shlex.quote(edge.span.file)} --edit changes it for all"
+                    " that use the file"
                 )
-            raise _ElsewhereError(reason, edge.at)
+            raise _ElsewhereError(reason, edge.span)
         if not self.mount.data:
-            raise _ElsewhereError(f"the pose is that of the preset of {edge.sensor}", edge.at)
+            raise _ElsewhereError(f"the pose is that of the preset of {edge.sensor}", edge.span)
 
     def _move_edits(self, old: Pose, new: Pose) -> list[Edit]:
         if "xyz" not in self.mount.data:
             return [self._insert_keys({"xyz": self._xyz(new)}, ("parent",))]
         before: Numbers = {(index,): value for index, value in enumerate(old.xyz)}
         after: Numbers = {(index,): value for index, value in enumerate(new.xyz)}
-        return self._or_inserted("xyz", self._xyz(new), before, after)
+        return self._edit_or_insert("xyz", self._xyz(new), before, after)
 
     def _rotate_edits(self, old: Quaternion, new: Quaternion) -> list[Edit]:
         key = next((name for name in FORMS if name in self.mount.data), None)
@@ -254,9 +254,9 @@ class _MountEditor:
             return [self._direction(new)]
         before = self._numbers(key)
         after: Numbers = FORMS[key](new, before, self.tolerance)
-        return self._or_inserted(key, self._complete(key, new, after), before, after)
+        return self._edit_or_insert(key, self._complete(key, new, after), before, after)
 
-    def _or_inserted(
+    def _edit_or_insert(
         self, key: str, complete: str | None, before: Numbers, after: Numbers
     ) -> list[Edit]:
         """Return the edits of a key's numbers.
@@ -285,11 +285,11 @@ class _MountEditor:
 
     def _direction(self, rotation: Quaternion) -> Edit:
         """Return the edit of ``look: down``: another direction, or angles."""
-        at = self._own(("look",))
+        span = self._own(("look",))
         for name, rpy in DIRECTIONS.items():
             if angle_between(quat_from_rpy(*rpy), rotation) <= self.tolerance:
-                return Edit(at, name)
-        return Edit(at, self._angles(FORMS["look"](rotation, {}, self.tolerance)))
+                return Edit(span, name)
+        return Edit(span, self._angles(FORMS["look"](rotation, {}, self.tolerance)))
 
     def _angles(self, numbers: Numbers) -> str:
         angles = [f"{step}: {self._new_angle(value)}" for (step,), value in numbers.items()]
@@ -312,7 +312,8 @@ class _MountEditor:
         if unknown:
             path = (key, *unknown[0])
             raise _ElsewhereError(
-                f"{_dotted_path(path)} is computed", self.source.at((*self.mount.entry, *path))
+                f"{_dotted_path(path)} is computed",
+                self.source.span_of((*self.mount.entry, *path)),
             )
         return found
 
@@ -328,18 +329,18 @@ class _MountEditor:
                 yield self._number((key, *path), value)
         if missing:
             self._own((key,))
-            place = self._place_in_text((*self.mount.entry, key))
-            yield MappingKeys(self.texts[place.span.file], place).insertion(missing)
+            location = self._place_in_text((*self.mount.entry, key))
+            yield MappingKeys(self.texts[location.span.file], location).insertion(missing)
 
     def _number(self, path: Path, value: float) -> Edit:
         span = self._own(path)
         scalar = text_at(self.texts[span.file], span).strip("\"'")
         if "${" in scalar:
             raise _ElsewhereError(f"{_dotted_path(path)} is computed: {scalar}", span)
-        found = _NUMBER.fullmatch(scalar)
-        if found is None or _value(scalar) is None:
+        match = _NUMBER.fullmatch(scalar)
+        if match is None or _value(scalar) is None:
             raise _ElsewhereError(f"{_dotted_path(path)} is {scalar}", span)
-        return Edit(span, self._short(value, found[3] or "", found[2]))
+        return Edit(span, self._short(value, match[3] or "", match[2]))
 
     def _own(self, path: Path) -> Span:
         """Return the span of a value below the entry, without an anchor or a tag.
@@ -347,39 +348,43 @@ class _MountEditor:
         It belongs to this entry alone.
         """
         at = (*self.mount.entry, *path)
-        span = self.source.exactly_at(at)
+        span = self.source.exact_span(at)
         if span is None:
-            raise _ElsewhereError(f"{_dotted_path(path)} is not there", self.source.at(at))
+            raise _ElsewhereError(f"{_dotted_path(path)} is not there", self.source.span_of(at))
         if span.file not in self.texts:
             raise _ElsewhereError(
                 f"{_dotted_path(path) or 'the pose'} is given in {span.file}", span
             )
-        sharing = [other for other, place in self._places(span.file).walk() if place.span == span]
+        sharing = [
+            other for other, location in self._places(span.file).walk() if location.span == span
+        ]
         if len(sharing) > 1:
             other = next(other for other in sharing if other != at)
             raise _SharedError(str(path[0]) if path else "the entry", _dotted_path(other), span)
-        found = _PROPERTIES.match(text_at(self.texts[span.file], span))
+        match = _PROPERTIES.match(text_at(self.texts[span.file], span))
         return (
-            span._replace(column=span.column + found.end())
-            if found and "\n" not in found[0]
+            span._replace(column=span.column + match.end())
+            if match and "\n" not in match[0]
             else span
         )
 
-    def _places(self, file: str) -> Place:
+    def _places(self, file: str) -> Location:
         if file not in self._raw:
             self._raw[file] = load(self.texts[file], file).places
         return self._raw[file]
 
-    def _place_in_text(self, path: Path) -> Place:
+    def _place_in_text(self, path: Path) -> Location:
         """Return the place of a mapping in its file, before anything was merged over it."""
-        span = self.source.at(path)
-        return next(place for _, place in self._places(span.file).walk() if place.span == span)
+        span = self.source.span_of(path)
+        return next(
+            location for _, location in self._places(span.file).walk() if location.span == span
+        )
 
     def _insert_keys(self, values: Mapping[str, str], after: tuple[str, ...]) -> Edit:
         """Return the edit that writes keys into the entry."""
         self._own(())
-        place = self._place_in_text(self.mount.entry)
-        return MappingKeys(self.texts[place.span.file], place).insertion(values, after)
+        location = self._place_in_text(self.mount.entry)
+        return MappingKeys(self.texts[location.span.file], location).insertion(values, after)
 
     def _xyz(self, pose: Pose) -> str:
         return _list(self._short(value, "") for value in pose.xyz)
@@ -407,8 +412,8 @@ _PART = 2
 
 
 class _SharedError(_ElsewhereError):
-    def __init__(self, what: str, other: str, at: Span) -> None:
-        super().__init__(f"{what} is shared with {other}", at)
+    def __init__(self, what: str, other: str, span: Span) -> None:
+        super().__init__(f"{what} is shared with {other}", span)
 
 
 #: Mappings of numbers: their keys, in the order of ``Robot.source_numbers``.

@@ -28,5 +28,5 @@ def facts_of(robot: Robot, sources: Sequence[Source], frame: str) -> list[str]:
     edge = robot.parent_edge(frame)
     if edge is None:
         return [f"{frame} is a root ({robot.frames[frame]})"]
-    values = values_of(edge, sources) or [str(edge.at)]
+    values = values_of(edge, sources) or [str(edge.span)]
     return [f"{frame} in {edge.parent}, {edge.kind}, by {edge.owner}", numbers(edge.pose), *values]

@@ -20,13 +20,15 @@ _ADDED, _REMOVED = "rgb(20, 130, 50)", "rgb(200, 40, 40)"
 _COLOURS = {"error": "rgb(220, 30, 30)", "warning": "rgb(200, 120, 20)"}
 
 
-def findings_html(found: Sequence[Finding], none: str = "") -> str:
+def findings_html(findings: Sequence[Finding], none: str = "") -> str:
     """Return findings as lines of HTML, the codes of errors in red.
 
     ``none`` is what to say where there are none.
     """
-    lines = [_line(finding) for finding in found[:MOST]] or [escape(none)]
-    return paragraphs([*lines, *([f"and {len(found) - MOST} more"] if len(found) > MOST else [])])
+    lines = [_line(finding) for finding in findings[:MOST]] or [escape(none)]
+    return paragraphs(
+        [*lines, *([f"and {len(findings) - MOST} more"] if len(findings) > MOST else [])]
+    )
 
 
 def _line(finding: Finding) -> str:
@@ -44,7 +46,7 @@ def paragraphs(lines: Sequence[str]) -> str:
     )
 
 
-def saved_html(saved: Saved) -> str:
+def format_saved(saved: Saved) -> str:
     """Return what a save did as HTML.
 
     The diff, what is found in the result, and what no edit can give.
@@ -54,14 +56,14 @@ def saved_html(saved: Saved) -> str:
     text = paragraphs(["saved:" if saved.diff else "nothing to save"])
     if saved.diff:
         text += _code([_diff_line(line) for line in saved.diff.splitlines()]) + findings_html(
-            saved.found
+            saved.findings
         )
     for place in saved.elsewhere:
         offer = _code(map(escape, place.overlay("", "").splitlines())) if place.entry else ""
         text += (
             paragraphs(
                 [
-                    f"{escape(place.reason)} ({escape(str(place.at))})"
+                    f"{escape(place.reason)} ({escape(str(place.span))})"
                     + "; in an overlay:" * bool(offer)
                 ]
             )

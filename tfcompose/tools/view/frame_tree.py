@@ -72,7 +72,7 @@ class FrameTree:
         """Return whether the tree is open below a frame: as chosen, or by its level."""
         return chosen.get(frame, self._depths[frame] < self._open_levels)
 
-    def opened(self, frame: str) -> dict[str, bool]:
+    def open_to(self, frame: str) -> dict[str, bool]:
         """Return what to choose so that a frame is among the rows: what is above it is open."""
         return dict.fromkeys(way_up(frame, self._parents.get)[1:], True)
 
@@ -102,7 +102,7 @@ class FrameTree:
             has_more = any(child in wanted for child in self._children.get(frame, ()))
             yield Row(frame, depth, is_open if has_more else None)
 
-    def hidden(self, chosen: Mapping[str, bool]) -> set[str]:
+    def hidden_frames(self, chosen: Mapping[str, bool]) -> set[str]:
         """Return the frames that are not shown.
 
         The nearest one above, or the frame itself, was chosen to be hidden.
@@ -116,5 +116,5 @@ class FrameTree:
         """Return what is chosen when a frame, with all below it, is shown or hidden."""
         others = below(self._children, frame)
         rest = {name: value for name, value in chosen.items() if name not in others}
-        is_so_above = (frame in self.hidden(rest)) != shown
+        is_so_above = (frame in self.hidden_frames(rest)) != shown
         return rest if is_so_above else {**rest, frame: shown}

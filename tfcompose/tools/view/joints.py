@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.model.plan.topics import joint_states_topic
 from tfcompose.tools.view.kinematics import joint_positions
 
@@ -102,7 +102,7 @@ class JointSender:
     @property
     def text(self) -> str:
         """What it does, as people read it."""
-        them = listed(self.others_found)
+        them = list_names(self.others_found)
         return {
             "waiting": f"looking whether anybody publishes {self.topic}",
             "sending": f"the sliders publish {self.topic}",

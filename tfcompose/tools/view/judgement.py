@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.geometry import offset_of
-from tfcompose.foundation.text import listed
-from tfcompose.guard.verdict.publishers import flooded
+from tfcompose.foundation.text import list_names
+from tfcompose.guard.verdict.publishers import find_floods
 from tfcompose.guard.verdict.tree import rejected_transforms
 from tfcompose.guard.verdict.verify import differences, group_differences, group_finding
 from tfcompose.model.plan.topics import parts_of
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 class Judgement:
     """What is wrong: all findings, those of each frame, and distances from the plan."""
 
-    found: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     of_frame: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
     off: Mapping[str, Offset] = field(default_factory=dict)
 
@@ -39,15 +39,15 @@ class Judgement:
         """The frames whose edges have an error."""
         return frozenset(
             frame
-            for frame, found in self.of_frame.items()
-            if any(finding.severity == "error" for finding in found)
+            for frame, findings in self.of_frame.items()
+            if any(finding.severity == "error" for finding in findings)
         )
 
     @property
     def summary(self) -> str:
         """What there is to say where nothing is found."""
         return (
-            f"elsewhere than declared: {listed(sorted(self.off))}"
+            f"elsewhere than declared: {list_names(sorted(self.off))}"
             if self.off
             else "all edges as expected"
         )
@@ -71,7 +71,9 @@ class PlanJudge:
         self._parts = parts_of(plan)
         self._tolerance = tolerance
         self._names = {robot.final(frame): frame for frame in robot.frames}
-        self._places: dict[str, Span] = {robot.final(edge.child): edge.at for edge in robot.edges}
+        self._places: dict[str, Span] = {
+            robot.final(edge.child): edge.span for edge in robot.edges
+        }
 
     def judge(
         self,
@@ -84,7 +86,7 @@ class PlanJudge:
         Frames are also off where those are that do not count, if what was sent ``holds``: nothing
         came after it.
         """
-        found: list[Finding] = []
+        findings: list[Finding] = []
         of_frame: dict[str, list[Finding]] = {}
         off: dict[str, Offset] = {}
         for topics, part in self._parts.items():
@@ -101,9 +103,9 @@ class PlanJudge:
                 (list(_children(group)), self._finding(group, state))
                 for group in group_differences(kept)
             ]
-            about += [([], finding) for finding in flooded(state)]
+            about += [([], finding) for finding in find_floods(state)]
             for children, finding in about:
-                found.append(finding)
+                findings.append(finding)
                 for child in dict.fromkeys(children):
                     of_frame.setdefault(self._names.get(child, child), []).append(finding)
             left = [
@@ -117,7 +119,7 @@ class PlanJudge:
                 for child, far in _off(difference)
             }
         return Judgement(
-            tuple(found), {frame: tuple(some) for frame, some in of_frame.items()}, off
+            tuple(findings), {frame: tuple(some) for frame, some in of_frame.items()}, off
         )
 
     def _finding(self, group: Sequence[Difference], state: TreeState) -> Finding:

@@ -221,7 +221,9 @@ def _status(name: str) -> RobotStatus | None:
     try:
         domain = domain_of(os.environ)
         places = [
-            place for place, _ in running() if place.domain == domain and is_meant(place, name)
+            runtime_dir
+            for runtime_dir, _ in running()
+            if runtime_dir.domain == domain and is_meant(runtime_dir, name)
         ]
         return ask(places[0], StatusRequest(), RobotStatus) if places else None
     except (RuntimeDirError, RequestRefusedError, OSError):

@@ -59,7 +59,7 @@ def page_of(robot: Robot, sources: Sequence[Source]) -> str:
         "frames": "".join(rows),
     }
     page = files("tfcompose.tools.view").joinpath("page.html").read_text("utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: filled[found[1]], page)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: filled[match[1]], page)
 
 
 def _swatch(colour: tuple[int, int, int]) -> str:

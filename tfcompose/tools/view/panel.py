@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.geometry import Pose, norm, quat_from_rpy
 from tfcompose.foundation.numbers import clean_rpy
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.tools.view.camera import VIEWS, begin_at, go_to, project
 from tfcompose.tools.view.choices import Choices
 from tfcompose.tools.view.edit import ImmovableError
 from tfcompose.tools.view.facts import facts_of, numbers
-from tfcompose.tools.view.findings import paragraphs, saved_html
+from tfcompose.tools.view.findings import format_saved, paragraphs
 from tfcompose.tools.view.joints import slider_range
 from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.scene import RobotScene, wxyz
@@ -362,7 +362,7 @@ class Panel:
             self._gui.add_button("save").on_click(lambda _: self.save())
             self.report = self._gui.add_html("")
         for handle in self._numbers:
-            handle.on_update(lambda _: self._typed())
+            handle.on_update(lambda _: self._take_typed())
 
     def _choose_snap(self) -> None:
         self.choices.snaps = self._snap.value
@@ -391,7 +391,7 @@ class Panel:
             self._enable(is_enabled=False)
             return
         self._enable(is_enabled=True)
-        pose = mount.given(mount.edge.pose)
+        pose = mount.pose_in_file(mount.edge.pose)
         self._given.content = paragraphs(
             [f"pose of <b>{escape(mount.place)}</b> in <b>{escape(mount.relative_to)}</b>"]
         )
@@ -401,7 +401,7 @@ class Panel:
         self.gizmo = self._server.scene.add_transform_controls(
             "/gizmo", scale=scale, wxyz=wxyz(at), position=at.xyz
         )
-        self.gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
+        self.gizmo.on_update(lambda event: self._take_dragged() if event.phase == "end" else None)
 
     def _enable(self, *, is_enabled: bool) -> None:
         """Let the mount be edited, or show its numbers in grey."""
@@ -418,19 +418,19 @@ class Panel:
             handle.value = round(value, 6) + 0.0
         self._showing = False
 
-    def _typed(self) -> None:
+    def _take_typed(self) -> None:
         if not self._showing:
             x, y, z, roll, pitch, yaw = (handle.value for handle in self._numbers)
             angles = (math.radians(angle) for angle in (roll, pitch, yaw))
             self.move(Pose((x / 1000, y / 1000, z / 1000), quat_from_rpy(*angles)))
 
-    def _dragged(self) -> None:
+    def _take_dragged(self) -> None:
         mount = self.session.mount(self.selected)
         w, qx, qy, qz = (float(value) for value in self.gizmo.wxyz)
         px, py, pz = (float(value) for value in self.gizmo.position)
         base = self.poses()[mount.relative_to]
         pose = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
-        self.move(_snap(pose, mount.given(mount.edge.pose)) if self.choices.snaps else pose)
+        self.move(_snap(pose, mount.pose_in_file(mount.edge.pose)) if self.choices.snaps else pose)
         self._show_selected()
 
     def move(self, pose: Pose) -> None:
@@ -456,7 +456,9 @@ class Panel:
             conflicts = sorted(self.window.conflicts & self.session.moved.keys())
             self.window.conflicts.clear()
             if conflicts:
-                message = f"not saved: another window saved {listed(conflicts)} at another pose"
+                message = (
+                    f"not saved: another window saved {list_names(conflicts)} at another pose"
+                )
                 self.say(paragraphs([escape(message), "save again to replace that"]))
                 return
             try:
@@ -464,7 +466,7 @@ class Panel:
             except OSError as error:
                 self.say(paragraphs([escape(f"not saved: {error}")]))
                 return
-            self.say(saved_html(saved))
+            self.say(format_saved(saved))
             self.tree.mark_moved(frozenset(self.session.moved))
             self._show_selected()
             if saved.diff:

@@ -98,7 +98,7 @@ class Pictures:
 
     def _picture(self, judgement: Judgement) -> Picture:
         in_roots = self._forest.in_roots(self._local)
-        rows = self._in_fixed(in_roots, in_roots)
+        rows = self._transform_to_fixed(in_roots, in_roots)
         placed = dict(zip(self._forest.frames, poses_of(rows), strict=True))
         known = self.robot.frames
         poses = {frame: placed[frame] for frame in known}
@@ -110,7 +110,7 @@ class Pictures:
         )
         return Picture(self._shown, poses, further, self._ghosts(judgement, in_roots), wrong)
 
-    def _in_fixed(self, in_roots: Rows, others: Rows) -> Rows:
+    def _transform_to_fixed(self, in_roots: Rows, others: Rows) -> Rows:
         return (
             self._forest.in_frame(self.fixed, in_roots, others)
             if self.fixed in self._forest.index
@@ -127,7 +127,7 @@ class Pictures:
             placed_local[row] = row_of(
                 self._planned_pose(child, pose_of(self._local[row].tolist()))
             )
-        placed = self._in_fixed(in_roots, self._forest.in_roots(placed_local))
+        placed = self._transform_to_fixed(in_roots, self._forest.in_roots(placed_local))
         frames = self._forest.below(set(off))
         return {
             frame: pose_of(placed[self._forest.index[frame]].tolist()) for frame in sorted(frames)
@@ -164,7 +164,7 @@ class ShownTree(ABC):
     def fixed(self, frame: str) -> None:
         self._pictures.fixed = frame
 
-    def moved(self) -> Picture | None:
+    def next_picture(self) -> Picture | None:
         """Return all poses if something moved or its judgement changed; else None."""
         return self._pictures.next(self._newest(), self.judgement)
 

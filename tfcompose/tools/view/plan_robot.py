@@ -38,8 +38,8 @@ def robot_of_plan(plan: Plan, description: str | None, file: str, find: Finder) 
         links = {final[name]: link for name, link in described.links.items()}
         limits = {final[edge.child]: edge.joint.limit for edge in described.edges if edge.joint}
     edges = tuple(_edge(edge, limits.get(edge.child)) for edge in plan.edges)
-    frames = {frame: edge.at for edge in edges for frame in (edge.parent, edge.child)}
-    frames |= {edge.child: edge.at for edge in edges}
+    frames = {frame: edge.span for edge in edges for frame in (edge.parent, edge.child)}
+    frames |= {edge.child: edge.span for edge in edges}
     frames |= {frame: Span(file) for frame in links if frame not in frames}
     return Robot(
         plan.robot,
@@ -55,8 +55,8 @@ def robot_of_plan(plan: Plan, description: str | None, file: str, find: Finder) 
 
 
 def _edge(edge: PlanEdge, limit: Limit | None) -> Edge:
-    at = Span(*edge.source)
-    joint = Joint(**asdict(edge.joint), at=at, limit=limit) if edge.joint else None
+    span = Span(*edge.source)
+    joint = Joint(**asdict(edge.joint), span=span, limit=limit) if edge.joint else None
     return Edge(
         edge.parent,
         edge.child,
@@ -68,5 +68,5 @@ def _edge(edge: PlanEdge, limit: Limit | None) -> Edge:
         joint=joint,
         switched=edge.switched,
         pose_known=edge.pose_known,
-        at=at,
+        span=span,
     )

@@ -59,7 +59,7 @@ class PublishedTree:
 
     def show(self) -> None:
         """Put the scene where the tree is now; nothing is sent for what stays."""
-        picture = self.tree.moved()
+        picture = self.tree.next_picture()
         if picture is None:
             return
         self._panel.published = picture.poses
@@ -76,7 +76,7 @@ class PublishedTree:
             self._edge,
             paragraphs([f"<b>{escape(frame)}</b>", *map(escape, self.tree.about(frame))]),
         )
-        _set(self._found, findings_html(self.tree.judgement.found, self.tree.judgement.summary))
+        _set(self._found, findings_html(self.tree.judgement.findings, self.tree.judgement.summary))
 
     def show_joints(self, lines: Sequence[str]) -> None:
         """Say whether sliders publish joint states, or who does instead."""

@@ -160,7 +160,7 @@ class ReloadedPanel:
         Return whether there is another panel.
         """
         if not self.session.accepts(state):
-            self.show(state.found)
+            self.show(state.findings)
             return False
         self.session.replace(texts, state)
         self.files.look_at(meshes_of(self.session.robot))
@@ -173,7 +173,7 @@ class ReloadedPanel:
             options = self._options | {"choices": before.choices, "window": before.window}
             self.panel = Panel(self.server, self.session, **options)
         if state.errors:
-            self.show(state.found)
+            self.show(state.findings)
         return True
 
     @property
@@ -184,9 +184,9 @@ class ReloadedPanel:
         """
         return self._broken.content if self._broken else ""
 
-    def show(self, found: tuple[Finding, ...]) -> None:
+    def show(self, findings: tuple[Finding, ...]) -> None:
         """Say what is wrong with the files as they are now."""
         if self._broken is None:
             with self.server.gui.add_folder("File", order=-2):
                 self._broken = self.server.gui.add_html("")
-        self._broken.content = findings_html(found)
+        self._broken.content = findings_html(findings)

@@ -32,7 +32,7 @@ class Saved:
     """
 
     diff: str = ""
-    found: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     refused: tuple[Finding, ...] = ()
     elsewhere: tuple[Elsewhere, ...] = ()
 
@@ -176,7 +176,7 @@ class Session:
         self._keep_undo(self.moved.keys() - elsewhere.keys())
         self.texts, self.state = texts, state
         self.moved = {child: pose for child, pose in self.moved.items() if child in elsewhere}
-        return Saved(diff, state.found, elsewhere=tuple(elsewhere.values()))
+        return Saved(diff, state.findings, elsewhere=tuple(elsewhere.values()))
 
     def _keep_undo(self, saved: AbstractSet[str]) -> None:
         """Let undo and redo lead to where frames were before the save."""

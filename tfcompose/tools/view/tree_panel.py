@@ -133,7 +133,7 @@ class TreePanel:
             )
         if choices.selected not in robot.frames:
             choices.selected = self.tree.frames[0]
-        choices.is_open |= self.tree.opened(choices.selected)
+        choices.is_open |= self.tree.open_to(choices.selected)
         panel = gui.add_panel()
         with panel.add_tab("Frames"):
             self._search: Any = gui.add_text("search", choices.search)
@@ -147,7 +147,7 @@ class TreePanel:
     @property
     def hidden(self) -> set[str]:
         """The frames that are hidden."""
-        return self.tree.hidden(self._choices.is_shown)
+        return self.tree.hidden_frames(self._choices.is_shown)
 
     def on_select(self, call: Callable[[], None]) -> None:
         """Call this when another frame is selected."""
@@ -161,7 +161,7 @@ class TreePanel:
         """Select a frame, and open the tree down to it."""
         with self._lock:
             self._choices.selected = frame
-            self._choices.is_open |= self.tree.opened(frame)
+            self._choices.is_open |= self.tree.open_to(frame)
             self._refresh(scrolls=True)
         for call in self._on_select:
             call()

@@ -40,8 +40,8 @@ def session_of(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
     except RejectedError as error:
         reject(error.findings)
     if session.state.robot is None or not session.robot.frames:
-        reject(session.state.found)
-    print_findings(session.state.found, sys.stderr)
+        reject(session.state.findings)
+    print_findings(session.state.findings, sys.stderr)
     return session
 
 
@@ -49,7 +49,7 @@ def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sess
     texts = {name: files(name) for name in (file, *arguments.overlays)}
     presets, packages = library(files), replace(disk_of(file, arguments), read=files)
 
-    def compiled(now: Mapping[str, str]) -> Compiled:
+    def compile_model(now: Mapping[str, str]) -> Compiled:
         def read(name: str) -> str:
             return now[name] if name in now else files(name)
 
@@ -69,7 +69,7 @@ def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sess
         rewrite(Path(name), old, new)
         files.wrote(name, new)
 
-    return Session(texts, compiled, write)
+    return Session(texts, compile_model, write)
 
 
 def _plan_session(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
@@ -78,7 +78,7 @@ def _plan_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sessi
         fail("a built plan cannot be edited: give the robot's file", UNREADABLE)
     packages = Packages(disk_of(file, arguments))
 
-    def compiled(now: Mapping[str, str]) -> Compiled:
+    def compile_model(now: Mapping[str, str]) -> Compiled:
         try:
             plan = read_plan(now[file], file)
             description = Path(file).with_name(plan.description)
@@ -87,7 +87,7 @@ def _plan_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sessi
         except RejectedError as error:
             return Compiled(None, error.findings)
 
-    return Session({file: files(file)}, compiled, lambda *_: None)
+    return Session({file: files(file)}, compile_model, lambda *_: None)
 
 
 def plan_of_session(session: Session) -> Plan:
@@ -100,5 +100,5 @@ def plan_of_session(session: Session) -> Plan:
     if is_plan(file):
         return read_plan(text, file)
     if session.state.errors:
-        reject(session.state.found)
+        reject(session.state.findings)
     return plan_of(session.robot.with_final_names())

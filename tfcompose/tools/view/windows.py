@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import listed
+from tfcompose.foundation.text import list_names
 from tfcompose.tools.view.findings import paragraphs
 from tfcompose.tools.view.panel import Window
 from tfcompose.tools.view.reload import ReloadedPanel, meshes_of
@@ -83,7 +83,7 @@ class Windows:
         self._lock = threading.RLock()
         self._open: dict[int, ReloadedPanel] = {}
         self._left: list[tuple[Session, Choices]] = []
-        self._found: tuple[Finding, ...] = ()
+        self._findings: tuple[Finding, ...] = ()
         files.look_at(meshes_of(session.robot))
         server.scene.world_axes.visible = False
         server.on_client_connect(lambda client: self.add(client, client.client_id))
@@ -112,10 +112,10 @@ class Windows:
             for shown in self._open.values():
                 if shown.accept(texts, state):
                     self._source.show_in(shown)
-            self._found = state.found
+            self._findings = state.findings
             if not self.session.accepts(state):
                 return False
-            self._found = state.found if state.errors else ()
+            self._findings = state.findings if state.errors else ()
             self._replace(texts, state)
             return True
 
@@ -137,8 +137,8 @@ class Windows:
                 window=Window(self._server, self._lock, lambda: self._share(number)),
             )
             self._open[number] = shown
-            if self._found:
-                shown.show(self._found)
+            if self._findings:
+                shown.show(self._findings)
             self._source.show_in(shown)
 
     def _remove(self, client: viser.ClientHandle) -> None:
@@ -179,7 +179,7 @@ def _word(moved: list[str], conflicts: set[str]) -> str:
     """Return what to say of a save in another window."""
     lines = ["another window saved its moves, which are shown here now"]
     if moved:
-        lines.append(f"not saved yet here: {listed(moved)}")
+        lines.append(f"not saved yet here: {list_names(moved)}")
     if conflicts:
-        lines.append(f"moved in both: {listed(sorted(conflicts))}")
+        lines.append(f"moved in both: {list_names(sorted(conflicts))}")
     return paragraphs([escape(line) for line in lines])

@@ -19,4 +19,4 @@ def beeper_on_nothing(robot: Robot) -> Iterator[Finding]:
     section = robot.sections["acme"]
     if section.value.frame not in robot.frames:
         message = f"the beeper is on {section.value.frame}, which is no frame"
-        yield finding("ACME101", message, section.at("frame"))
+        yield finding("ACME101", message, section.span_of("frame"))

@@ -29,7 +29,7 @@ def beeper(section: ToolSection) -> Iterator[Process]:
     yield Process(
         "beeper",
         "run",
-        at=section.at_key(),
+        span=section.key_span(),
         argv=(PROGRAM, "beep", "${plan}"),
         required=False,
     )
@@ -49,4 +49,4 @@ def far_beeper(section: ToolSection, robot: Robot) -> Iterator[Finding]:
     """Yield a finding where the beeper is said to reach too far."""
     if section.value.reach > MOST_M:
         message = f"the beeper of {robot.name} does not reach {section.value.reach:g} m"
-        yield finding("ACME102", message, section.at("reach"))
+        yield finding("ACME102", message, section.span_of("reach"))

@@ -89,7 +89,7 @@ def compiled_in_s(now):
     result = compile_robot(now["r.yaml"], "r.yaml", shelves, read=read, disk=disk)
     if result.robot and not result.errors:
         emit(result.robot)
-    crashed = [one.message for one in result.found if one.code == "TF903"]
+    crashed = [one.message for one in result.findings if one.code == "TF903"]
     assert not crashed, crashed
     return time.process_time() - begun
 

@@ -64,7 +64,7 @@ plan = plan_of(robot)
 observers = observers_of(plan)
 tree = LiveTree(robot, plan, observers, Offset(1e-3, 1e-3))
 def show():
-    print("view:", *(found.code for found in tree.judge(FOUND_S).found), flush=True)
+    print("view:", *(finding.code for finding in tree.judge(FOUND_S).findings), flush=True)
 with Stop() as stop, RosFeed("view", observers) as feed:
     follow(feed, stop, every_s=0.2, show=show)
 """

@@ -16,11 +16,11 @@ if "guard" in sys.orig_argv:
     graph.ids_say_who = lambda node: False
     graph.gid_of = lambda publisher: gid_of(publisher)[::-1]
     import tfcompose.tf.ros.node as node
-    received = node.Subscription._received
+    receive = node.Subscription._receive
     def turned(self):
-        one = received(self)
-        return dataclasses.replace(one, raw_gid=one.raw_gid[::-1])
-    node.Subscription._received = turned
+        received = receive(self)
+        return dataclasses.replace(received, raw_gid=received.raw_gid[::-1])
+    node.Subscription._receive = turned
 """
 
 

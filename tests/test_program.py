@@ -19,6 +19,8 @@ def run(folder: Path, *words: str, python_path: str | None = None) -> tuple[int,
     return done.returncode, done.stdout + done.stderr
 
 
+#: ``guard`` with a file, or without arguments, is the command.
+USAGE = {"guard": ["guard", "no", "such", "arguments"]}
 KINDS = ("static", "joints", "simulate", "guard", "exec")
 
 
@@ -29,7 +31,7 @@ def test_a_process_imports_no_file_of_the_current_folder(
     start: list[str], kind: str, tmp_path: Path
 ) -> None:
     write_namesakes(tmp_path)
-    code, output = run(tmp_path, *start, kind)
+    code, output = run(tmp_path, *start, *USAGE.get(kind, [kind]))
     assert (code, f"usage: tfcompose {kind} " in output) == (2, True), output
 
 
@@ -40,7 +42,7 @@ def test_python_path_does_not_give_a_process_the_current_folder(
     write_namesakes(tmp_path, loaded_first=False)
     (tmp_path / "tfcompose").mkdir()
     for start in (HERE, anywhere(sys.executable)):
-        code, output = run(tmp_path, *start, "guard", python_path=python_path)
+        code, output = run(tmp_path, *start, *USAGE["guard"], python_path=python_path)
         assert (code, "usage: tfcompose guard " in output) == (2, True), output
 
 

@@ -25,7 +25,12 @@ pytestmark = pytest.mark.xdist_group("sources")
 
 ROWS = (*PROCESS_KEYS, EXTRA_ARGUMENTS)
 TABLE = PACKAGE / "model" / "process_keys.py"
-FILES = {file: file.read_text("utf-8") for file in sorted(PACKAGE.rglob("*.py"))}
+#: All but the one that names the attributes of ROS's launch that a robot's element refuses.
+FILES = {
+    file: file.read_text("utf-8")
+    for file in sorted(PACKAGE.rglob("*.py"))
+    if file != PACKAGE / "tools" / "ros2" / "actions.py"
+}
 #: A unit that starts a whole plan, which no process's key is about.
 UNIT_OF_THE_LAUNCHER = PACKAGE / "tools" / "deploy" / "unit.py"
 #: So many files know a key: its row, the plan's field, where it acts, and two more.

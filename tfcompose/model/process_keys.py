@@ -47,6 +47,13 @@ STARTED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-
 ENDED: tuple[Way, ...] = ("run", "simulate", "container")
 LOADED: tuple[Way, ...] = ("component",)
 OWN: tuple[Way, ...] = ("built-in",)
+#: Keys that a node takes as ROS arguments, and how they are written on a command line.
+ROS_ARGUMENTS = {
+    "remap": "-r FROM:=TO",
+    "log_level": "--log-level LEVEL",
+    "namespace": "-r __ns:=/NAMESPACE",
+    "params": "--params-file ${params_file}",
+}
 
 
 # Types that are more than a Python type says.

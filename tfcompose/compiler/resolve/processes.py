@@ -21,6 +21,7 @@ from tfcompose.compiler.resolve.presets import (
 )
 from tfcompose.foundation.findings import Note, did_you_mean, finding
 from tfcompose.model.plan import Ready, Simulation, Sweep
+from tfcompose.model.process_keys import ROS_ARGUMENTS
 from tfcompose.model.robot import (
     BUILT_IN,
     GUARD,
@@ -461,14 +462,6 @@ def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Itera
         yield finding("TF851", message, spec.key_span((*path, key)), help=advice)
 
 
-_WORDS = {
-    "remap": "-r FROM:=TO",
-    "log_level": "--log-level LEVEL",
-    "namespace": "-r __ns:=/NAMESPACE",
-    "params": "--params-file ${params_file}",
-}
-
-
 def check_arguments(draft: Draft) -> Iterator[Finding]:
     """Yield findings about files without parameters and keys that reach no node."""
     spec = draft.spec
@@ -476,8 +469,9 @@ def check_arguments(draft: Draft) -> Iterator[Finding]:
         path: Path = ("processes", process.name)
         names_params_file = any("${params_file}" in text for text in process.texts)
         if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
-            keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
-            for key in keys:
+            for key in ROS_ARGUMENTS:
+                if key == "params" and names_params_file:
+                    continue
                 if getattr(process, key) and spec.spans.has((*path, key)):
                     yield _unreached_key(key, process, spec.key_span((*path, key)))
         elif (
@@ -492,7 +486,7 @@ def check_arguments(draft: Draft) -> Iterator[Finding]:
 
 def _unreached_key(key: str, process: Process, span: Span) -> Finding:
     """Return a warning about a key for ROS arguments that a shell or launch file drops."""
-    advice = f"write it into the command: --ros-args {_WORDS[key]}; or give run as a list"
+    advice = f"write it into the command: --ros-args {ROS_ARGUMENTS[key]}; or give run as a list"
     message = f"{key} does not reach {process.name}, whose run is a shell command"
     if process.argv[:2] == ROS2_LAUNCH:
         advice = (

@@ -138,15 +138,15 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_797,
-    "model": 1_961,
-    "spec": 4_936,
-    "compiler": 10_249,
-    "tf": 5_626,
-    "guard": 4_512,
-    "launcher": 3_922,
-    "cli": 5_620,
-    "tools": 12_230,
+    "foundation": 1_807,
+    "model": 1_965,
+    "spec": 4_966,
+    "compiler": 10_251,
+    "tf": 5_703,
+    "guard": 4_520,
+    "launcher": 4_137,
+    "cli": 5_634,
+    "tools": 13_709,
 }
 
 

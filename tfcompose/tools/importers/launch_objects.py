@@ -250,7 +250,7 @@ def _xml_with_lines(file: Any) -> Any:
 
 
 def _lines_of(element: Any) -> Iterator[int]:
-    yield element.at.line
+    yield element.span.line
     for child in element.children:
         yield from _lines_of(child)
 

@@ -1,4 +1,4 @@
-"""Start of a plan: the observation before it, and who published before that."""
+"""Observation before a plan starts, and publishers that were there already."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ COUNTING_S = 0.7
 
 @dataclass(slots=True)
 class StartTime:
-    """The observation before the start: monotonic seconds, and nanoseconds of the system's clock.
+    """The observation before the start."""
 
-    It is over when it is ``cleared``.
-    """
-
+    #: In monotonic seconds.
     begun: float
+    #: In nanoseconds of the system clock.
     begun_ns: int
+    #: When it ended, in monotonic seconds; None: it goes on.
     cleared: float | None = None
+    #: When it ended, in nanoseconds of the system clock.
     cleared_ns: int = 0
 
     def clear(self, now: float) -> None:
@@ -36,14 +37,14 @@ class StartTime:
         self.cleared_ns = self.begun_ns + int((now - self.begun) * 1e9)
 
     def may_show_first(self, sender: MessageCounter | None, now: float) -> bool:
-        """Return whether more messages can tell if the publisher was there before the start."""
+        """Return whether further messages can show if the publisher was there before the start."""
         if sender is None or self.cleared is None or now - self.cleared > FIRST_S:
             return False
         began_before = sender.began_before(self.cleared_ns - FIRST_BY_NS)
         return began_before is None and now - sender.first_received < COUNTING_S
 
     def was_first(self, sender: MessageCounter | None, now: float) -> bool:
-        """Return whether the publisher was there before the start, as far as is known."""
+        """Return whether the publisher is known to have been there before the start."""
         if self.cleared is None:
             return True
         if sender is None or now - self.cleared >= FIRST_S:

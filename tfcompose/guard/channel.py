@@ -1,11 +1,9 @@
-"""The guard's ends of the pipes to and from the launcher.
+"""The guard's ends of the pipes to and from the launcher: orders, events and memory.
 
-Orders in, events out, and what the next guard must know.
-
-Without a launcher there are no orders, and events go to the guard's own output. What a guard
-leaves to the one that follows it, should it die, the launcher keeps without looking into it:
-``model.variables.MEMORY_FD`` names the environment variable that holds the descriptor of a file
-with the memory, one JSON object, by the TF topics that a judge watches.
+Without a launcher there are no orders, and events go to the guard's own output. The memory is the
+state for the next guard, should this one die. The launcher keeps it without reading it:
+``model.variables.MEMORY_FD`` names the environment variable with the descriptor of a file that
+holds it, as one JSON object with a key for each pair of TF topics.
 """
 
 from __future__ import annotations
@@ -79,7 +77,7 @@ _SWITCHES, _ANSWERED = "switches", "answered"
 
 
 class OrderReader:
-    """Follows the launcher's orders as they come."""
+    """Reads the launcher's orders."""
 
     def __init__(
         self,
@@ -134,7 +132,7 @@ class OrderReader:
 
 
 class EventWriter:
-    """Writes the events of one cycle at once, so that a killed guard leaves no half of them."""
+    """Writes the events of one cycle at once, so that a killed guard leaves no partial event."""
 
     def __init__(self, *, judges: bool) -> None:
         self._judges = judges
@@ -143,7 +141,7 @@ class EventWriter:
         self._alive_due = 0.0
 
     def emit(self, event: GuardEvent) -> None:
-        """Take an event; a guard with mode off keeps its findings to itself."""
+        """Queue an event; a guard with mode off drops its findings."""
         if not self._judges and not isinstance(event, _OBSERVATIONS):
             return
         if self._pipe is not None:
@@ -152,7 +150,7 @@ class EventWriter:
             say(line_of(event).decode().rstrip())
 
     def heartbeat(self) -> None:
-        """Write a heartbeat when it is due; never wait for a launcher that does not read."""
+        """Write a heartbeat when it is due; never block on a launcher that does not read."""
         now = time.monotonic()
         if self._pipe is None or now < self._alive_due:
             return
@@ -161,7 +159,7 @@ class EventWriter:
             self.emit(Alive())
 
     def flush(self) -> None:
-        """Write the taken notices."""
+        """Write the queued events."""
         if not self._lines or self._pipe is None:
             return
         data = memoryview(b"".join(self._lines))
@@ -174,9 +172,9 @@ class EventWriter:
 
 
 class SilentEdges:
-    """Reports which edges that were live became silent, and which are no longer.
+    """Reports which live edges fell silent, and which of these are back.
 
-    The launcher counts them out.
+    The launcher does not count silent edges as live.
     """
 
     def __init__(self, judges: Sequence[Judge], emit: Callable[[GuardEvent], None]) -> None:

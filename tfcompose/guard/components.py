@@ -1,8 +1,8 @@
 """Loading and unloading of components in containers, with or without a launcher's orders.
 
-A container is asked one thing at a time, in the order of the orders. Where no launcher gives
-orders, in units and containers of an export, the guard looks at each container now and then, and
-loads what it does not have: also into one that was started again.
+A container handles one request at a time, in the order of the orders. Without a launcher, as in
+exported units and containers, the guard checks each container periodically and loads missing
+components, also after a container restarts.
 """
 
 from __future__ import annotations
@@ -42,25 +42,25 @@ CHECK_EVERY_S = 2.0
 
 @dataclass(slots=True)
 class _Job:
-    """One order, how far it is, and since when; ``step`` is empty until the container was asked.
-
-    ``listed`` is when the container was asked what it has, ``absent`` how often the component was
-    not there.
-    """
+    """One order and its progress."""
 
     order: ComponentOrder
     request: LoadRequest
+    #: The pending request; empty before the first one.
     step: str = ""
+    #: When the step began, in monotonic seconds.
     since: float = 0.0
+    #: When the container was last asked for its components, in monotonic seconds.
     listed: float = 0.0
+    #: How often the component was missing from the container's list.
     absent: int = 0
 
 
 class Components:
-    """The orders that are not carried out yet, by container, and the components that were loaded.
+    """Pending orders by container, and the loaded components.
 
-    A component that a container does not have any more, because somebody unloaded it, or because a
-    container that the launcher did not start is another one now, is reported as unloaded.
+    A component that is missing from its container is reported as unloaded: something unloaded it,
+    or replaced a container that the launcher did not start.
     """
 
     def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
@@ -95,20 +95,17 @@ class Components:
         jobs.append(_Job(order, request, since=time.monotonic()))
 
     def forget(self, process: str) -> None:
-        """Carry out no order about the component any more.
-
-        It is stopped, or its container has ended.
-        """
+        """Drop orders about the component, because it is stopped or its container has ended."""
         self._loaded.pop(process, None)
         for name, jobs in self._jobs.items():
             self._jobs[name] = deque(job for job in jobs if job.order.process != process)
 
     def has(self, process: str) -> bool:
-        """Return whether an order about the component is not carried out yet."""
+        """Return whether an order about the component is pending."""
         return any(job.order.process == process for jobs in self._jobs.values() for job in jobs)
 
     def check(self) -> None:
-        """Take the answers that have come, and ask on."""
+        """Read answers, and send the next requests."""
         now = time.monotonic()
         for name, jobs in self._jobs.items():
             while jobs and self._is_done(jobs[0], self._containers[name], now):
@@ -120,7 +117,7 @@ class Components:
                     self._check_loaded(name, container)
 
     def _check_loaded(self, name: str, container: Container) -> None:
-        """Read the answer with a container's components, and ask again."""
+        """Read the container's list of components, and request it again."""
         loaded = [entry for entry in self._loaded.values() if entry[1].container == name]
         there, is_there = container.list.answer(), container.list.is_there
         for order, request in loaded if there or not is_there else ():
@@ -189,7 +186,7 @@ class Components:
     def _begins(self, job: _Job, container: Container, now: float, step: str) -> bool:
         """Check for the component, or load it.
 
-        Return False where that cannot be asked, and is answered.
+        Return False if the request is impossible, and the order answered.
         """
         if step == "look" and not container.list.is_there:
             return True
@@ -242,10 +239,7 @@ class Components:
 
 
 def _already(request: LoadRequest, there: Any) -> str:
-    """Return why a component is not loaded whose node the container has already.
-
-    Two would have one name.
-    """
+    """Return why a component is not loaded: the container already has a node of its name."""
     number = there.unique_ids[list(there.full_node_names).index(request.node)]
     unload = f"ros2 component unload {request.container} {number}"
     return (
@@ -255,7 +249,7 @@ def _already(request: LoadRequest, there: Any) -> str:
 
 
 class ComponentDriver:
-    """The plan's components, without a launcher that gives orders."""
+    """The plan's components, loaded without a launcher's orders."""
 
     def __init__(self, node: Node, own: Own, *, private: bool) -> None:
         def fill(text: str) -> str:

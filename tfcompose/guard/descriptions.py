@@ -1,7 +1,7 @@
-"""The robot's description, given to nodes that run: stock robot_state_publishers.
+"""Passes a new robot description to running nodes: stock robot_state_publishers.
 
-Robot_state_publisher takes ``robot_description`` while it runs, and sends /tf_static and the
-description anew. One that refuses it, or does not answer, the launcher starts anew.
+robot_state_publisher accepts ``robot_description`` while it runs, and sends /tf_static and the
+description again. The launcher restarts one that refuses it or does not answer.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LINE = re.compile(rf'^ +"{_NAME}": ("[^\n]*")$', re.MULTILINE)
 
 
 class Descriptions:
-    """The descriptions that nodes have not taken yet, by process."""
+    """Descriptions that nodes have not accepted yet, by process."""
 
     def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
         self._node = node
@@ -38,7 +38,7 @@ class Descriptions:
         self._writers: dict[str, tuple[ParameterWriter, float]] = {}
 
     def take(self, order: DescriptionOrder) -> None:
-        """Give a node its description, instead of one that is still waiting."""
+        """Queue a description for a node, in place of one still waiting."""
         self.forget(order.process)
         try:
             match = _LINE.search(Path(order.file).read_text(encoding="utf-8"))
@@ -52,7 +52,7 @@ class Descriptions:
         self._writers[order.process] = writer, time.monotonic()
 
     def forget(self, process: str) -> None:
-        """Give the process's node no description any more: it ended, or is stopped."""
+        """Drop the description for the process's node: it ended, or is stopped."""
         writer, _ = self._writers.pop(process, (None, 0.0))
         if writer:
             writer.close()

@@ -26,19 +26,18 @@ OK, WARN, ERROR, STALE = 0, 1, 2, 3
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One line of a diagnostics page: ``level`` is one of OK, WARN, ERROR, STALE.
-
-    ``values`` are keys and values.
-    """
+    """One line of a diagnostics page."""
 
     name: str
+    #: OK, WARN, ERROR or STALE.
     level: int
     message: str
+    #: Pairs of key and value.
     values: Sequence[tuple[str, str]] = ()
 
 
 class DiagnosticsPublisher:
-    """Publishes statuses about the robot that is called ``hardware_id``."""
+    """Publishes statuses of the robot named ``hardware_id``."""
 
     def __init__(self, node: Node, hardware_id: str) -> None:
         from diagnostic_msgs import msg  # noqa: PLC0415 (the package is optional)
@@ -58,7 +57,7 @@ class DiagnosticsPublisher:
         return bool(self._publisher.get_subscription_count())
 
     def publish(self, statuses: Sequence[Status], stamp_ns: int) -> None:
-        """Publish them with this time, in nanoseconds."""
+        """Publish them, stamped with this time in nanoseconds."""
         array = self._messages.DiagnosticArray(
             status=[self._status(status) for status in statuses]
         )
@@ -88,7 +87,7 @@ def _level(edge: EdgeHealth) -> int:
 def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
     """Return the status of the edges that a strict guard blocked.
 
-    Transforms by their sender's node, parent and child.
+    ``held`` counts transforms by their sender's node, parent and child.
     """
     lines = [
         (f"{parent} → {child} from {who}", str(count))
@@ -132,7 +131,7 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], findings: Sequence[Finding
 
 
 class DiagnosticsPage:
-    """Publishes the judges' knowledge on /diagnostics, once a second while anybody reads."""
+    """Publishes the judges' knowledge on /diagnostics, once a second while it has subscribers."""
 
     def __init__(self, node: Node, robot: str) -> None:
         self._robot = robot
@@ -151,8 +150,8 @@ class DiagnosticsPage:
     ) -> None:
         """Publish if it is due and there is a subscriber.
 
-        ``found`` give what is wrong now, but for edges that are silent or slow; ``held`` says what
-        a strict guard held back.
+        ``found`` return the open findings, except for silent or slow edges; ``held`` returns the
+        transforms that a strict guard blocked.
         """
         now = time.monotonic()
         if self._publisher is None or now < self._due:

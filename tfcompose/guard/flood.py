@@ -1,7 +1,4 @@
-"""Reads messages of publishers that flood the tree.
-
-Beside everything else, and a little at a time, so that nothing waits.
-"""
+"""Reads messages of publishers that flood the tree, in small steps that delay nothing else."""
 
 from __future__ import annotations
 
@@ -27,9 +24,9 @@ _TOGETHER = 50
 class FloodReader:
     """Extracts the declared edges from long messages, as separate messages.
 
-    ``children`` are the frames whose edges are declared. A message that comes while another is
-    read is skipped, and ``skipped`` counts it; so much of each second goes into reading, whoever
-    floods the tree.
+    ``children`` are the frames whose edges are declared. A message that arrives while another is
+    read is skipped and counted in ``skipped``. Reading takes at most a fixed part of each second,
+    for all flooding publishers together.
     """
 
     def __init__(self, children: Collection[str]) -> None:
@@ -42,18 +39,18 @@ class FloodReader:
 
     @property
     def is_reading(self) -> bool:
-        """Whether there are messages, and time left in this second to read them."""
+        """Whether there are messages to read, and time left in this second."""
         return self._data is not None and self._spent_s <= BUSY_S
 
     def add(self, data: TFData) -> None:
-        """Take a message to read, unless there is one already."""
+        """Take a message to read, unless one is being read."""
         if self._data is not None:
             self.skipped += 1
             return
         self._data, self._rest, self._transforms = data, transforms(data.received.data), []
 
     def read(self, now: float) -> TFData | None:
-        """Read on for a moment; return the message's declared edges once it is read."""
+        """Continue reading briefly; return the message's declared edges once it is complete."""
         if now - self._since >= 1.0:
             self._spent_s, self._since = 0.0, now
         if self._data is None or self._spent_s > BUSY_S:

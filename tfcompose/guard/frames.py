@@ -1,6 +1,6 @@
-"""Frames of the tree that the guard watches: the parent of each, and its latest senders.
+"""Frames of the guarded tree: the parent of each, and its latest senders.
 
-They distinguish publishers that alternate from one that was restarted, and show loops.
+The senders tell alternating publishers from a restarted one; the parents reveal loops.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Frame:
 
 
 class Frames:
-    """Child frames by name: those of the plan, and others that were sent."""
+    """Child frames by name: those of the plan, and others received."""
 
     def __init__(self, plan: Plan) -> None:
         self._planned = {edge.child: Frame(edge.parent, float("inf")) for edge in plan.edges}
@@ -55,7 +55,7 @@ class Frames:
         return is_new
 
     def take_sender(self, child: str, gid: bytes) -> tuple[bytes, bool]:
-        """Note who sent the frame; return who did before, and whether ``gid`` alternates.
+        """Note the frame's sender; return the previous one, and whether ``gid`` alternates.
 
         A publisher alternates if another has sent the frame since it did.
         """
@@ -103,7 +103,7 @@ class Frames:
         }
 
     def recall(self, memory: Mapping[str, tuple[str, ...]]) -> None:
-        """Take over the senders that the guard before this one knew."""
+        """Restore the senders that the previous guard knew."""
         for child, senders in memory.items():
             if child in self._planned:
                 self._planned[child].senders = tuple(map(bytes.fromhex, senders))

@@ -1,13 +1,12 @@
 """Checks that the guard makes on nodes: gates that the plan waits for, and switches.
 
 Gates are topics, services, and the lifecycle states of nodes, which the guard may also drive.
-Where no launcher gives orders, in units and containers, the guard brings nodes into their states
-by itself: a node that was started again is brought there again; one that somebody deactivated
-stays so.
+Without a launcher, as in exported units and containers, the guard brings nodes into their states
+by itself: again after a restart, but not after a user deactivated one.
 
-Switches are parameters that the plan wrote for nodes; they are read back. Each node is asked once
-after it appears. Drivers declare parameters late, once they have found their device: one that is
-not there yet is asked for again, for a while. A node that leaves and comes back is asked anew.
+Switches are parameters that the plan wrote for nodes; the guard reads them back. It asks each node
+once after it appears, and again after it restarts. Drivers declare parameters late, once they have
+found their device, so the guard asks for a missing one again, for a while.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ class Gates:
         self._due = 0.0
 
     def add(self, gate: Gate) -> None:
-        """Look at this gate from now on."""
+        """Check this gate from now on."""
         self.forget(gate.process)
         if gate == Gate(gate.process):
             return
@@ -62,7 +61,7 @@ class Gates:
             self._nodes[gate.process, name] = _lifecycle(self._node, name, state, drive=gate.drive)
 
     def forget(self, process: str) -> None:
-        """Look at the process's gate no more."""
+        """Stop checking the process's gate."""
         self._gates.pop(process, None)
         self._reported.pop(process, None)
         for key in [key for key in self._nodes if key[0] == process]:
@@ -124,7 +123,7 @@ class _DrivenNode:
 
 
 class LifecycleDriver:
-    """The plan's lifecycle nodes, without a launcher that gives orders."""
+    """The plan's lifecycle nodes, driven without a launcher's orders."""
 
     def __init__(self, node: Node, plan: Plan) -> None:
         wanted = {
@@ -199,7 +198,7 @@ class Switches:
         self.follow(plan)
 
     def follow(self, plan: Plan) -> None:
-        """Read the switches of a plan from now on; nodes whose switches are the same go on."""
+        """Read a plan's switches from now on; nodes with the same switches continue."""
         before = {watched.node: watched for watched in self._nodes}
         self._nodes = []
         for process in plan.processes:
@@ -219,16 +218,16 @@ class Switches:
         return [watched.node for watched in self._nodes if watched.done]
 
     def recall(self, answered: Collection[str]) -> None:
-        """Ask these no more, unless they leave: the guard before this one has.
+        """Skip these nodes until they leave: they answered the previous guard.
 
-        Those that are not found yet, too.
+        That includes nodes not discovered yet.
         """
         self._finds_until = time.monotonic() + FINDING_S
         for watched in self._nodes:
             watched.done = watched.node in answered
 
     def check(self) -> None:
-        """Take the answers that have come and send the requests that are due, without blocking."""
+        """Read answers and send due requests, without blocking."""
         now = time.monotonic()
         if not self._nodes or now < self._due:
             return

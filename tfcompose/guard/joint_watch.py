@@ -1,7 +1,7 @@
 """Watches joint states: each joint must belong to the robot and have one publisher.
 
-A joint's edge has one publisher whoever sends the states, so TF alone does not show that two do.
-The topics are read from time to time and wake nobody.
+A joint's edge has one publisher whoever sends the states, so TF alone does not reveal two senders.
+The topics are polled, so that their messages do not wake the guard.
 """
 
 from __future__ import annotations

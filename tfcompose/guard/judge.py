@@ -1,8 +1,8 @@
 """The guard's judgement: who may publish which edge, and how, message by message.
 
-A judge takes messages, the graph and the time, and returns events; it reads no clock and no topic,
-so that histories can be replayed. Times are monotonic seconds, but for those of messages, which
-are nanoseconds of the system clock. Faults of edges are in its ledger.
+A judge takes messages, the graph and the time, and returns events. It reads no clock and no topic,
+so that histories can be replayed. Times are monotonic seconds, except those of messages, which are
+nanoseconds of the system clock. Its ledger has the faults of edges.
 """
 
 from __future__ import annotations
@@ -42,35 +42,33 @@ class JudgeMemory:
     """
 
     start: StartTime
-    #: By frame who sent it, the newest sender last.
+    #: The senders of each frame, the newest last.
     owners: dict[str, tuple[str, ...]]
     #: By publisher.
     senders: dict[str, SenderMemory]
     faults: dict[str, tuple[Fault, ...]]
-    #: The codes and publishers that were reported.
+    #: The reported codes and publishers.
     reported: tuple[tuple[str, str], ...]
     live: LivenessMemory
 
 
 def started_nodes(plan: Plan) -> dict[str, str]:
-    """Return the processes that the plan starts, by their nodes."""
+    """Return the processes that the plan starts, by node."""
     return {node: process.name for process in plan.managed for node in process.nodes}
 
 
 @dataclass(slots=True)
 class Judge:
-    """The state of a watch over a plan; it observes ``settle_s`` before all clear.
-
-    ``says_who`` says whether the ids of messages are those of the graph; where they are not, they
-    tell senders apart. ``remapped`` says that what the plan's processes send is fenced off by
-    remappings.
-    """
+    """The state of a watch over a plan."""
 
     plan: Plan
+    #: How long it observes before the start, in seconds.
     settle_s: float
     begun: float
     begun_ns: int
+    #: True: the ids of messages are those of the graph. False: they only distinguish senders.
     says_who: bool = True
+    #: True: remappings isolate the plan's processes.
     remapped: bool = False
     live: Liveness = field(init=False)
     clocks: Clocks = field(init=False)
@@ -94,7 +92,7 @@ class Judge:
         self._started = started_nodes(self.plan)
 
     def follow(self, plan: Plan) -> None:
-        """Follow a plan that differs in its edges' lines and poses, and in other processes."""
+        """Follow a plan that differs in lines and poses of edges, and in other processes."""
         self.plan = plan
         self._publishers.follow(plan)
         self._sent.follow(plan)
@@ -103,9 +101,9 @@ class Judge:
         self.ledger.follow(plan)
 
     def take(self, message: Message, now: float) -> JudgedMessage:
-        """Take a message and return the verdict on it, with which it can be passed on.
+        """Take a message and return the verdict on it, by which it can be forwarded.
 
-        Give both to ``arrived`` afterwards; ``tick`` reports violations.
+        Pass both to ``judge_arrival`` afterwards; ``tick`` reports violations.
         """
         self._senders.heard(message, now)
         if message.poses:
@@ -115,7 +113,7 @@ class Judge:
     def judge_arrival(
         self, judged: JudgedMessage, message: Message, now: float
     ) -> list[GuardEvent]:
-        """Judge when a message that was taken came; return which edges it brings to life."""
+        """Judge the arrival of a taken message; return events for the edges that it makes live."""
         if not judged.children:
             return []
         return self.live.note_arrivals(
@@ -129,12 +127,12 @@ class Judge:
         return judged.admitted
 
     def is_starting(self, now: float) -> bool:
-        """Return whether others wait for what it reports: until the tree is complete, or late."""
+        """Return whether processes wait for its reports: until the tree is complete, or late."""
         cleared = self._start.cleared
         return cleared is None or (now - cleared < STARTING_S and not self.live.is_complete)
 
     def next_tick(self, now: float, every_s: float) -> float:
-        """Return when ``tick`` is due: the end of the observation is not passed by."""
+        """Return when ``tick`` is due, at the latest at the end of the observation."""
         end = self.begun + self.settle_s
         return (
             min(now + every_s, end) if self._start.cleared is None and end > now else now + every_s
@@ -146,9 +144,9 @@ class Judge:
         return self._sent.frames
 
     def name_of(self, gid: bytes | None) -> str:
-        """Return the publisher's node, or all that it may be; empty while that is not known.
+        """Return the publisher's node, or all candidates; empty while unknown.
 
-        One with the name of a process's node that is not of that process is another one.
+        A publisher with the name of a process's node, but of another process, is "another" one.
         """
         nodes = self._senders.nodes(gid, static=False) if gid is not None else ()
         process, is_ours = self._senders.process(gid), self._senders.is_ours(gid)
@@ -175,7 +173,7 @@ class Judge:
         return events
 
     def clock(self, sim_ns: int | None, now: float) -> None:
-        """Take the newest time on /clock. After a jump back, stamps may go back too."""
+        """Take the newest time on /clock. After it jumps back, stamps may go back too."""
         before = self.clocks.sim_ns
         self.clocks.take(sim_ns, now)
         if before is not None and sim_ns is not None and sim_ns < before:
@@ -237,7 +235,7 @@ class Judge:
     def wrong(self) -> list[Finding]:
         """Return the open findings, worst first.
 
-        Silence and low rates are not among it: they are part of ``health``, and ``live`` has them.
+        Silence and low rates are not among them: ``health`` and ``live`` have those.
         """
         return self.ledger.wrong()
 
@@ -252,7 +250,7 @@ class Judge:
 
     @property
     def mark(self) -> tuple[int, ...]:
-        """A value that changes with the state for the next guard."""
+        """A value that changes whenever the state for the next guard does."""
         changes = (self.ledger.epoch, self.live.changes, self._publishers.changes)
         return (*changes, *self._senders.mark)
 

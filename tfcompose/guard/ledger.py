@@ -1,12 +1,13 @@
 """Ledger of edges: their publishers, faults and reports.
 
-A message is judged once; the verdict holds for the next one of the same publisher with the same
-edges until the ledger's ``epoch`` changes: with the senders of a frame, the shape of the tree, the
-start, or the end of a fault. What a nameless publisher sent waits for its name, for a while.
+A message is judged once. The verdict holds for the publisher's next messages with the same edges
+until the ledger's ``epoch`` changes: with the senders of a frame, the shape of the tree, the
+start, or the end of a fault. A message from a publisher without a known node name waits for the
+name, for a while.
 
-A fault is known by its publisher. Faults of one code and one name of publishers are reported
-together, in one finding that names each process; again when some of these end and others go on;
-and they are over with the last of them.
+A fault belongs to a publisher. Faults with one code and one node name are reported together, in
+one finding that names each process. They are reported again when some end and others go on, and
+they are over with the last of them.
 """
 
 from __future__ import annotations
@@ -90,11 +91,11 @@ class OpenFault:
 
     fault: Fault
     gid: bytes | None
-    #: When it was observed first and last, in monotonic seconds.
+    #: When it was first and last observed, in monotonic seconds.
     since: float
     last: float
     reported: bool = False
-    #: The publishers that were named, of which several may alternate.
+    #: The publishers named in the report; several may alternate.
     named: frozenset[bytes | None] = frozenset()
 
 
@@ -104,17 +105,17 @@ class JudgedMessage:
 
     stamps: StampHistory = field(default_factory=StampHistory)
     epoch: int = -1
-    #: How long it holds at most, in monotonic seconds.
+    #: How long the verdict holds at most, in monotonic seconds.
     until: float = 0.0
     entries: tuple[OpenFault, ...] = ()
-    #: The planned edges that came with it, by their children.
+    #: The planned edges in the message, by child.
     children: tuple[str, ...] = ()
     #: The edges that may pass; None: all.
     admitted: frozenset[Ends] | None = None
 
 
 class Ledger:
-    """Edges that came, by publisher, under a plan; ``epoch`` changes with all that it knows."""
+    """Received edges by publisher, under a plan; ``epoch`` changes with all that it knows."""
 
     def __init__(self, plan: Plan, senders: Senders, start: StartTime) -> None:
         self.epoch = 0
@@ -143,7 +144,7 @@ class Ledger:
         self._nodes = {node for process in offenders for node in process.nodes}
 
     def follow(self, plan: Plan) -> None:
-        """Follow a plan that differs in its edges' lines and poses, and in other processes."""
+        """Follow a plan that differs in lines and poses of edges, and in other processes."""
         self._plan = plan
         self._know_processes(plan)
         self.planned = {edge.child: edge for edge in plan.edges}
@@ -175,7 +176,7 @@ class Ledger:
         return judged
 
     def judge(self, judged: JudgedMessage, message: Message, now: float) -> None:
-        """Judge the edges of a message; the verdict holds if all of it is certain."""
+        """Judge the edges of a message; the verdict is kept if it is certain."""
         nodes = self._senders.nodes(message.gid, static=message.static)
         sure = self._senders.is_sure(message.gid)
         epoch, certain = self.epoch, sure
@@ -212,7 +213,7 @@ class Ledger:
         judged.until = now + UNDECLARED_S if unplanned else float("inf")
 
     def recheck(self, now: float) -> list[tuple[str, ...]]:
-        """Judge messages that waited for a name; return the planned edges in them, by sender."""
+        """Judge messages that waited for a name; return their planned edges, by sender."""
         arrived: dict[bytes | None, list[str]] = {}
         for sent, since in list(self._waiting.items()):
             nodes = self._senders.nodes(sent.gid, static=sent.static)
@@ -251,7 +252,7 @@ class Ledger:
         self.epoch += 1
 
     def forget_stamps(self) -> None:
-        """Take the next stamps as first ones: the clock has gone back."""
+        """Treat the next stamps as the first ones: the clock has gone back."""
         for judged in self._judged.values():
             judged.stamps = StampHistory()
 
@@ -276,7 +277,7 @@ class Ledger:
         return NAMELESS_S if is_known or is_early else NAMELESS_OWNER_S
 
     def _has_arrived(self, sent: SentEdge, fault: Fault | None) -> bool:
-        """Return whether the owner's edge has come; any that alternates may be the owner."""
+        """Return whether the owner's edge has come; any alternating publisher may be the owner."""
         if sent.child not in self.planned or fault is None:
             return sent.child in self.planned
         return fault.namesake and self.frames.current_sender(sent.child) is not None
@@ -327,12 +328,12 @@ class Ledger:
         return replace(fault, code=faults.TWO_PUBLISHERS, detail=other)
 
     def _is_namesake(self, edge: PlanEdge, sent: SentEdge) -> bool:
-        """Return whether a publisher has the owner's name and is surely not the owner.
+        """Return whether a publisher has the owner's name and certainly is not the owner.
 
-        A process of this run proves by its environment which one it is: where the plan starts the
-        owner, no other process is it, and no stranger while it is there itself. Without proof it
-        is another where it spoke before the start, and where tfcompose's own publisher, which is
-        never restarted, is there already.
+        A process of this run proves its identity by its environment. If the plan starts the owner,
+        no other process of the run is the owner, and while the owner is present, no process from
+        elsewhere is. Without proof, a publisher is another one if it sent before the start, or if
+        tfcompose's own publisher, which never restarts, is already present.
         """
         gid, sender, start = sent.gid, self._senders.sender(sent.gid), self._start
         if sender is None or not self._starts.get(edge.owner, False):
@@ -350,10 +351,10 @@ class Ledger:
         return self._senders.is_present(current) and not is_proven
 
     def _is_alternating(self, edge: PlanEdge, sent: SentEdge) -> bool:
-        """Return whether several with the owner's name send the edge by turns: A, B, and A again.
+        """Return whether several publishers with the owner's name send the edge in turns: A, B, A.
 
-        Any of them may be the owner, unless one has proven that it is. Fixed edges come again
-        whenever a subscription is made anew.
+        Any of them may be the owner, unless one has proven that it is. Fixed edges do not count:
+        they arrive again with every new subscription.
         """
         gid = sent.gid
         if gid is None or self._senders.sender(gid) is None:
@@ -370,7 +371,8 @@ class Ledger:
     def report(self, now: float, *, at_once: bytes | None = None) -> list[GuardEvent]:
         """Report new faults, those of one group in one finding.
 
-        With ``at_once`` they are that publisher's, whatever may still come to be known of them.
+        ``at_once`` is a publisher: report all its faults now, even if more may become known about
+        them.
         """
         grouped: dict[Group, list[OpenFault]] = {}
         for entry in self.entries.values():
@@ -391,9 +393,9 @@ class Ledger:
         return events
 
     def over(self, now: float) -> list[GuardEvent]:
-        """Forget faults that have ended, and report it; the next of their kind is a new one.
+        """Drop ended faults, and report their end; the next of their kind is new.
 
-        An edge that others of the same name go on with is not over: these are reported again.
+        An edge is not over while others of the same name send it: these are reported again.
         """
         ended = [
             key
@@ -427,7 +429,7 @@ class Ledger:
         return sorted(findings, key=lambda finding: (finding.severity, finding.code))
 
     def memory(self) -> dict[str, tuple[Fault, ...]]:
-        """Return the faults that were reported and are not over, by publisher, in hexadecimal."""
+        """Return the open faults that were reported, by publisher id in hexadecimal."""
         reported: dict[str, tuple[Fault, ...]] = {}
         for entry in self.entries.values():
             if entry.reported:
@@ -436,7 +438,7 @@ class Ledger:
         return reported
 
     def recall(self, memory: Mapping[str, Sequence[Fault]], until: float) -> None:
-        """Take these as reported by the guard before, and as going on ``until`` then at least."""
+        """Restore faults reported by the previous guard; they last at least ``until`` then."""
         for hexed, known in memory.items():
             gid = bytes.fromhex(hexed) or None
             for fault in known:
@@ -444,11 +446,11 @@ class Ledger:
                 self.entries[self._key(fault, gid)] = entry
 
     def _replan_fault(self, fault: Fault) -> Fault:
-        """Return a fault that was found under another plan with the edge of this one."""
+        """Return a fault found under another plan, with this plan's edge."""
         return replace(fault, edge=self.planned.get(fault.child)) if fault.edge else fault
 
     def _group(self, entry: OpenFault) -> Group:
-        """Return the group of a fault in reports: its code and node, or the robot of the node."""
+        """Return a fault's group in reports: its code and node, or the node's robot."""
         if run := self._senders.run(entry.gid):
             return (OTHER_ROBOT, run.name, "")
         return (entry.fault.code, entry.fault.who, self._senders.process(entry.gid))
@@ -462,10 +464,10 @@ class Ledger:
         return by_group
 
     def _is_ripe(self, entry: OpenFault, now: float) -> bool:
-        """Return whether nothing more comes to be known of a fault.
+        """Return whether all that can be known about a fault is known.
 
-        Where ids do not say whose they are, whoever alternates with the owner may not be in the
-        graph yet; all that it shows a while later are named.
+        If ids do not identify nodes, a publisher that alternates with the owner may not be in the
+        graph yet. All candidates in the graph a while later are named.
         """
         fault, gid = entry.fault, entry.gid
         sender = self._senders.sender(gid)
@@ -517,7 +519,7 @@ class Ledger:
         return FindingShown(replace(finding, notes=(*finding.notes, *notes)), offender)
 
     def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
-        """Report edges again whose publishers have changed."""
+        """Repeat the reports of edges whose publishers have changed."""
         due = [group for group in self._left if self._is_due((group, False), now)]
         by_group = self._by_group() if due else {}
         for group in due:
@@ -539,7 +541,7 @@ class Ledger:
     def _compare(self, entry: OpenFault, edges: Mapping[Ends, Sequence[OpenFault]]) -> None:
         """Note that a fault is over, or that its publishers have changed.
 
-        The entry has ended, or is of publishers that alternate; ``edges`` are its group's.
+        The entry has ended, or belongs to alternating publishers; ``edges`` are its group's.
         """
         group, fault = self._group(entry), entry.fault
         others = [other for other in edges.get(fault.ends, ()) if other.reported]
@@ -572,8 +574,8 @@ class Ledger:
     def _publishers(self, entries: Sequence[OpenFault]) -> list[bytes | None]:
         """Return the present publishers of these entries: one id for each process.
 
-        A process may have a publisher on each topic. Where it is not known by its pid, only
-        publishers of one edge on one topic are surely several.
+        A process may have a publisher on each topic. If its pid is unknown, only publishers of one
+        edge on one topic are certain to be different processes.
         """
         sent = [(gid, entry.fault) for entry in entries for gid in self._gids_of(entry)]
         if not all(self._senders.is_sure(gid) for gid, _ in sent):
@@ -611,13 +613,13 @@ class Ledger:
         entries: Sequence[OpenFault],
         now: float,
     ) -> bool:
-        """Return whether the robot of these ``edges`` was reported, and with ones as wrong."""
+        """Return whether the robot of these ``edges`` was reported for a fault as severe."""
         is_severe = any(entry.fault.edge or self._was_first(entry, now) for entry in entries)
         known = [entry for sent in edges.values() for entry in sent if entry.reported]
         return any(not is_severe or entry.fault.edge for entry in known)
 
     def _may_be_ours(self, fault: Fault) -> bool:
-        """Return whether a process would be stopped for it if it were proven to be of this run."""
+        """Return whether the policy stops a process of this run for the fault, if proven."""
         stops = self._plan.guard.on_violation == "stop-offender" and fault.code in _STOPPED_FOR
         return stops and not self._nodes.isdisjoint(fault.nodes)
 

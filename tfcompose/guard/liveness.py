@@ -1,11 +1,11 @@
 """Liveness of owners: arrivals of their edges, judged at given times.
 
-Edges that have always come together share one history. At first those of one owner do, and a
-message that holds only some of them parts them; so a message costs what it brings, however many
-edges it holds.
+Edges that have always arrived together share one history. At first these are the edges of one
+owner. A message with only some of them splits the history, so the cost of a message does not
+depend on the number of its edges.
 
-Times are monotonic seconds. What is measured is the time in which the guard looked: a guard that
-was kept from looking knows nothing of the time between, and blames nobody for it.
+Times are monotonic seconds. Silence counts only time in which the guard ran: a guard that was
+suspended or starved knows nothing of that time, and blames no owner for it.
 """
 
 from __future__ import annotations
@@ -52,18 +52,20 @@ CATCH_UP_S = 3.5
 
 @dataclass(frozen=True, slots=True)
 class EdgeHealth:
-    """One planned edge: which node publishes it (full name, empty while none has), and how.
-
-    ``rate`` is in hertz, ``age_s`` counts since it came last, ``delay_s`` is how old its stamp was
-    then; None: not known. ``silent`` and ``slow`` are against what the plan says.
-    """
+    """State of one planned edge."""
 
     edge: PlanEdge
+    #: The full name of the publishing node; empty: none.
     publisher: str = ""
+    #: In hertz; None: unknown.
     rate: float | None = None
+    #: Time since the last arrival, in seconds; None: unknown.
     age_s: float | None = None
+    #: Age of the last stamp at its arrival, in seconds; None: unknown.
     delay_s: float | None = None
+    #: True: it should have come again by now, at the plan's rate.
     silent: bool = False
+    #: True: its rate is below the plan's.
     slow: bool = False
 
     @property
@@ -79,35 +81,32 @@ class EdgeHealth:
 
 @dataclass(slots=True)
 class WatchedTime:
-    """The seconds in which the guard ran.
-
-    A clock that stops while the guard is kept from running.
-    """
+    """The seconds in which the guard ran: a clock that stops while the guard does."""
 
     _seconds: float = 0.0
     _ticked: float | None = None
     _catching_up_until: float = 0.0
 
     def time_at(self, now: float) -> float:
-        """Return the seconds until ``now``."""
+        """Return the watched seconds until ``now``."""
         if self._ticked is None or now < self._catching_up_until:
             return self._seconds
         return self._seconds + min(max(now - self._ticked, 0.0), MAX_TICK_S)
 
     def begins_late(self, until: float) -> None:
-        """Treat owners that are missing until then as not discovered yet."""
+        """Treat owners missing until that time as not discovered yet."""
         self._catching_up_until = max(self._catching_up_until, until)
 
     def is_behind(self, now: float) -> bool:
-        """Return whether messages that arrive now may have waited.
+        """Return whether messages that arrive now may be delayed.
 
-        The guard was kept from running, or lost messages, or still catches up.
+        The guard did not run for a while, lost messages, or is still catching up.
         """
         stalled = self._ticked is not None and now - self._ticked > STALLED_S
         return stalled or now < self._catching_up_until
 
     def tick(self, now: float) -> float:
-        """Note that the guard runs now, and return the seconds until then."""
+        """Note that the guard runs now, and return the watched seconds."""
         if self._ticked is not None and now - self._ticked > STALLED_S:
             self._catching_up_until = now + CATCH_UP_S
         self._seconds, self._ticked = self.time_at(now), now
@@ -116,29 +115,29 @@ class WatchedTime:
 
 @dataclass(slots=True)
 class Track:
-    """State of planned edges that arrive together: of one owner, kind and rate.
-
-    ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age
-    of the last stamp when it came, ``silent_after`` how long the edges may be quiet, in seconds,
-    or None if they say no rate.
-    """
+    """State of planned edges that arrive together, of one owner, kind and rate."""
 
     edges: tuple[PlanEdge, ...]
+    #: Longest gap in seconds before the edges count as silent; None: they have no rate.
     silent_after: float | None = field(init=False)
+    #: Age of the last stamp at its arrival, in seconds.
     delay_s: float | None = None
     live: bool = False
+    #: The last arrival, in monotonic seconds.
     last: float = 0.0
+    #: The last arrival, in watched seconds.
     heard: float = 0.0
     silent: bool = False
     silent_since: float = 0.0
     steady: bool = False
     slow: bool = False
+    #: In watched time.
     arrivals: Arrivals = field(default_factory=Arrivals)
     _window_ns: int = field(init=False)
 
     @property
     def edge(self) -> PlanEdge:
-        """One of them."""
+        """One of the edges."""
         return self.edges[0]
 
     def __post_init__(self) -> None:
@@ -151,7 +150,7 @@ class Track:
     def note_arrival(self, watched: float, now: float, *, late: bool = False) -> None:
         """Note an arrival; two arrivals close together end an edge's silence.
 
-        ``late`` says that it may have waited: it tells nothing of the rate.
+        ``late``: the message may have waited, so it does not count for the rate.
         """
         after = self.silent_after
         self.steady = after is not None and self.live and watched - self.heard <= after
@@ -163,13 +162,13 @@ class Track:
             )
 
     def forget(self) -> None:
-        """Take the next arrival as the first one."""
+        """Treat the next arrival as the first one."""
         self.arrivals = Arrivals(int(STRETCH * self._window_ns))
 
     def rate(self) -> float | None:
         """Return the rate over the window in hertz, without its longest gap.
 
-        None while there is too little to say.
+        None if there are too few arrivals.
         """
         return self.arrivals.steady_rate(self._window_ns // 2)
 
@@ -184,10 +183,7 @@ class SilentMemory:
 
 @dataclass(frozen=True, slots=True)
 class LivenessMemory:
-    """State for the next guard.
-
-    The edges, by their children, that are live, slow and silent, and gone owners.
-    """
+    """State for the next guard: edges by child frame, and owners that left."""
 
     live: tuple[str, ...]
     slow: tuple[str, ...]
@@ -211,7 +207,7 @@ class WrongEdges:
 class Liveness:
     """The planned edges and their owners.
 
-    ``changes`` counts what was reported, and what became of owners.
+    ``changes`` counts reports, and owners that stopped, started or left.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -249,7 +245,7 @@ class Liveness:
     def absent(self, owner: str) -> None:
         """Note that the owner was stopped on purpose.
 
-        Its edges are not live, and not missing either.
+        Its edges are neither live nor missing.
         """
         self._absent.add(owner)
         self.changes += 1
@@ -279,7 +275,7 @@ class Liveness:
     def recall(self, memory: LivenessMemory, now: float, until: float) -> None:
         """Restore the previous guard's state, and report no silence before ``until``.
 
-        Discovery starts anew.
+        Discovery starts over.
         """
         self._watched.begins_late(until)
         self._gone = set(memory.gone)
@@ -302,7 +298,7 @@ class Liveness:
     def note_arrivals(
         self, children: tuple[str, ...], now: float, delay_s: float | None = None
     ) -> list[GuardEvent]:
-        """Take edges that owners sent in one message; return the events that follow."""
+        """Take edges that owners sent in one message; return the resulting events."""
         watched, late, events = self._watched.time_at(now), self._watched.is_behind(now), []
         for track in self._of_message.get(children) or self._part_tracks(children):
             if track.edge.owner in self._absent:
@@ -315,7 +311,7 @@ class Liveness:
         return events
 
     def _part_tracks(self, children: tuple[str, ...]) -> list[Track]:
-        """Return the tracks of exactly these edges; tracks that hold others too are parted."""
+        """Return the tracks of exactly these edges; split tracks that have others too."""
         wanted = set(children)
         touched = {id(track): track for child in children for track in (self._track_of[child],)}
         found = []
@@ -334,7 +330,7 @@ class Liveness:
         return found
 
     def _began(self, track: Track) -> list[GuardEvent]:
-        """Return that the track's edges are live."""
+        """Return events: the track's edges are live."""
         owner = track.edge.owner
         self.changes += 1
         children = tuple(edge.child for edge in track.edges)
@@ -356,7 +352,7 @@ class Liveness:
         return now - track.last, track.rate() if track.silent_after is not None else None
 
     def silent(self) -> tuple[str, ...]:
-        """Return the children of the edges that were live and come no more."""
+        """Return the children of edges that were live and no longer arrive."""
         return _children(
             [
                 track
@@ -369,7 +365,7 @@ class Liveness:
         return track.edge.kind == "static" and track.edge.owner in self._gone
 
     def is_behind(self, now: float) -> bool:
-        """Return whether messages that arrive now may have waited for the guard."""
+        """Return whether messages that arrive now may be delayed."""
         return self._watched.is_behind(now)
 
     def note_lost_messages(self, now: float) -> None:
@@ -377,16 +373,14 @@ class Liveness:
         self._watched.begins_late(now + CATCH_UP_S)
 
     def tick(self, now: float) -> None:
-        """Note that the guard runs, without judging anybody."""
+        """Note that the guard runs, without judging owners."""
         self._watched.tick(now)
 
     def judge(self, now: float, speed: float = 1.0, *, paused: bool = False) -> list[GuardEvent]:
-        """Return which owners fell silent or slow since the last time, and came back.
+        """Return which owners fell silent or slow since the last call, or recovered.
 
-        One event for each owner.
-
-        ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are
-        lower, and in one that is ``paused`` nobody falls silent.
+        One event for each owner. ``speed`` is the real-time factor: rates are lower in a slow
+        simulation, and no owner falls silent in one that is ``paused``.
         """
         watched = self._watched.tick(now)
         if paused:
@@ -429,7 +423,7 @@ class Liveness:
         return sorted(tracks, key=lambda track: self._order[track.edge.child])
 
     def partly_missing(self) -> dict[str, list[str]]:
-        """Return the fixed edges, by name, that never came from a node of which others came."""
+        """Return the names of fixed edges that never came, by the node that sent others."""
         if not any(self._waiting.values()):
             return {}
         fixed = [
@@ -447,7 +441,7 @@ class Liveness:
     def static_writers(self, nodes: Collection[str]) -> list[GuardEvent]:
         """Take the nodes that write /tf_static now.
 
-        An owner whose edges were live and that is gone is silent.
+        An owner of live edges that is gone counts as silent.
         """
         lost: dict[str, list[Track]] = {}
         events: list[GuardEvent] = []
@@ -483,7 +477,7 @@ def _wrong(change: str, tracks: list[Track], now: float) -> WrongEdges | None:
 
 
 def _recovery_event(change: str, tracks: list[Track], now: float) -> RecoveredShown:
-    """Return the event for tracks that came back, or come at their rate again."""
+    """Return the event for tracks that arrive again, or at their rate again."""
     edges = [edge for track in tracks for edge in track.edges]
     named, are = list_names([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
     if change == "back":
@@ -501,7 +495,7 @@ def _children(tracks: list[Track]) -> tuple[str, ...]:
 
 
 def _change(track: Track, watched: float, speed: float) -> str | None:
-    """Update the track and return changes."""
+    """Update the track and return its change."""
     after = track.silent_after or 0.0
     is_silent = watched - track.heard > after
     if is_silent and not track.silent:

@@ -1,6 +1,6 @@
-"""Watches messages that the guard itself loses, so that no owner is blamed for them.
+"""Watches for messages that the guard itself loses, so that no owner is blamed for them.
 
-A burst of messages that is more than the guard's sockets hold loses its last ones on the way.
+If a burst of messages exceeds the buffers of the guard's sockets, the kernel drops the last ones.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ OVER_S = 10.0
 
 
 class LossWatch:
-    """Tells judges when the guard lost something, and says so once."""
+    """Tells judges when the guard lost messages, and reports that once."""
 
     def __init__(self, judges: Sequence[Judge], emit: Callable[[GuardEvent], None]) -> None:
         self._judges, self._emit = judges, emit
@@ -39,13 +39,13 @@ class LossWatch:
         return self._wrong
 
     def check(self) -> None:
-        """See whether something was lost, if it is time; call it before the judges judge."""
+        """Check for losses when due; call it before the judges judge."""
         if (now := time.monotonic()) >= self._due:
             self._due = now + CHECK_EVERY_S
             self.take(self._lost.take(), now)
 
     def take(self, lost: int, now: float) -> None:
-        """Take how many datagrams were lost since the last time."""
+        """Take the number of datagrams lost since the last call."""
         if lost:
             self._over_at = now + OVER_S
             for judge in self._judges:

@@ -1,10 +1,10 @@
 """The guard's process: it watches TF topics until a signal comes.
 
-What it finds goes to the launcher as lines of JSON on the descriptor that ``TFCOMPOSE_EVENTS_FD``
-names, and to its own output where there is no launcher. ``TFCOMPOSE_SETTLE_S`` is how long it
-observes before the others are started. Robots beside each other on topics of their own have one
-guard, and one judge for each pair of topics: what one owner may publish on its robot's topics is a
-violation on another's, so each pair is judged alone.
+It writes events to the launcher as lines of JSON on the descriptor that ``TFCOMPOSE_EVENTS_FD``
+names, or without a launcher to its own output. ``TFCOMPOSE_SETTLE_S`` is how long it observes
+before the other processes start. Robots with separate TF topics share one guard, with one judge
+for each pair of topics. Each pair is judged alone, because an edge that an owner may publish on
+its robot's topics is a violation on another's.
 """
 
 from __future__ import annotations
@@ -93,9 +93,8 @@ REPORT_EVERY_S = 10.0
 class TopicWatch:
     """Feeds a judge with a pair of topics (moving, fixed).
 
-    Where the plan is strict, passes on what is admitted.
-
-    ``private`` are the topics that the plan's processes are remapped to, where they are.
+    In a strict plan, forwards the admitted edges. ``private`` are the topics that the plan's
+    processes are remapped to, if they are.
     """
 
     def __init__(
@@ -165,7 +164,7 @@ class TopicWatch:
         self.data.close()
 
     def step(self) -> None:
-        """Take new messages and, from time to time, the graph."""
+        """Take new messages and, periodically, the graph."""
         now = time.monotonic()
         if self._clock:
             self.judge.clock(self._clock.now_ns(), now)
@@ -195,17 +194,14 @@ class TopicWatch:
                 self._pass_on(self.judge.leaks(self._graph.global_publishers(), self._leaks_to))
 
     def report(self, every_s: float = REPORT_EVERY_S) -> None:
-        """Report blocked edges from time to time."""
+        """Report blocked edges periodically."""
         if self.relay and (not every_s or time.monotonic() >= self._report_due):
             self._report_due = time.monotonic() + every_s
             if held := self.relay.held.report():
                 say(f"held back: {held}")
 
     def _take(self, data: Iterable[TFData], now: float) -> bool:
-        """Take messages; read the graph first if it is needed to identify senders.
-
-        Return whether that was so.
-        """
+        """Take messages; return whether the graph had to be read first to identify senders."""
         messages = [_with_id(message) for message in data]
         strangers = {message.received.gid for message in messages} - self._known.keys()
         self._known |= dict.fromkeys(strangers)
@@ -215,7 +211,7 @@ class TopicWatch:
         return bool(strangers)
 
     def _judge(self, read: Iterable[tuple[JudgedMessage, Message]], now: float) -> None:
-        """Judge when messages came, after all of them are passed on."""
+        """Judge the arrivals of messages, after all of them are forwarded."""
         for judged, message in read:
             self._pass_on(self.judge.judge_arrival(judged, message, now))
 
@@ -267,7 +263,7 @@ class TopicWatch:
 def gather_s(taken: int, *, is_prompt: bool) -> float:
     """Return the time to gather messages after a step, in seconds.
 
-    ``is_prompt`` says that what comes must not wait.
+    ``is_prompt``: messages must not wait.
     """
     return 0.0 if is_prompt or taken >= GATHER_BELOW else GATHER_S
 
@@ -275,7 +271,7 @@ def gather_s(taken: int, *, is_prompt: bool) -> float:
 def _run_marks(plan: Plan, profile: str) -> RunMarks:
     """Return the identities in the environments of this run's processes.
 
-    A component is where its container is.
+    A component has the environment of its container.
     """
     inside = {
         (process.component.container, node): process.name
@@ -295,9 +291,9 @@ def _run_marks(plan: Plan, profile: str) -> RunMarks:
 
 
 def _with_id(data: TFData) -> TFData:
-    """Return it with the id that it has instead, where the rmw does not say who sent it.
+    """Return the data with the substitute id if the rmw does not identify the sender.
 
-    That tells senders apart.
+    The substitute distinguishes senders.
     """
     received = data.received
     return (
@@ -330,7 +326,7 @@ def together(
 ) -> Callable[[GuardEvent], None]:
     """Return the sink for events of the judges of these plans.
 
-    All clear and tree complete are reported once, when the last judge has reported them.
+    It reports "all clear" and "tree complete" once, when the last judge has reported them.
     """
     waiting = {Clear: len(plans), TreeComplete: sum(bool(plan.edges) for plan in plans)}
 
@@ -447,7 +443,7 @@ def _watches(
 ) -> list[TopicWatch]:
     """Return the watch over each pair of topics.
 
-    One that follows another guard, or has mode off, has begun.
+    A watch that follows a previous guard, or has mode off, skips the observation.
     """
     judges, joins = own.plan.guard.mode != "off", bool(os.environ.get(JOINS))
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges and not joins else 0.0
@@ -470,7 +466,7 @@ def _watches(
 
 
 def _of(private: dict[str, Topics] | None, plan: Plan, topics: Topics) -> dict[str, Topics] | None:
-    """Return the remapped topics of the processes that would send on these topics."""
+    """Return the remapped topics of the plan's processes that would send on these topics."""
     if private is None:
         return None
     return {name: pair for name, pair in private.items() if plan.process(name).topics == topics}

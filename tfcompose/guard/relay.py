@@ -1,9 +1,9 @@
 """Relay of a strict guard: it forwards the edges that each process owns.
 
-A message that is all its sender's goes on as it is, byte for byte. Of others what is not is left
-out. Each sender of fixed edges has a latched publisher here, so that late joiners get all of them
-while their sender is there, also where it sent one after the other; a guard that follows one that
-died latches them again.
+A message whose edges all belong to its sender is forwarded unchanged, byte for byte. Foreign edges
+are removed from other messages. Each sender of fixed edges has a latched publisher here, so that
+late joiners receive all of them while the sender is present, even if it sent them one after the
+other. A guard that replaces one that died latches them again.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ class _Latched:
 
 
 class Relay:
-    """Forwards messages of separated processes on one pair of topics (moving, fixed).
+    """Forwards messages of isolated processes on one pair of topics (moving, fixed).
 
-    ``own`` takes the ids of its publishers. With ``feedback`` the fence is one of remappings.
-    ``changes`` counts what was latched.
+    Adds the ids of its publishers to ``own``. ``feedback``: remappings isolate the processes.
+    ``changes`` counts changes of the latched edges.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class Relay:
     def memory(self) -> dict[str, Any]:
         """Return the latched edges for the next guard.
 
-        Not every sender latches all that it has sent.
+        It cannot get them from the senders, because not all of them latch all their edges.
         """
         return {
             f"{_LATCHED}{gid.hex()}": [sender.process, b64encode(sender.data).decode()]
@@ -130,9 +130,10 @@ class Relay:
         }
 
     def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
-        """Latch the previous guard's edges that may still pass; keep their senders for a while.
+        """Latch the previous guard's edges that may still pass.
 
-        Until then the senders are found again.
+        Their senders count as present ``until`` that time, because they have to be discovered
+        again.
         """
         self._finds_until = until
         for part, entry in memory.items():
@@ -158,9 +159,9 @@ class Relay:
             self._feedback.update()
 
     def _forget_others(self, writers: Collection[Publisher], present: Collection[bytes]) -> None:
-        """Feed no more what everybody had from one that has left.
+        """Stop feeding edges of publishers outside the plan's processes that have left.
 
-        Where ids do not tell who, from all when all have.
+        If ids do not identify publishers, stop when all have left.
         """
         if self._feedback is None:
             return
@@ -172,9 +173,9 @@ class Relay:
         self._feedback.forget([source for source in others if source not in present])
 
     def _refuse(self, gid: bytes) -> None:
-        """Say once of a publisher that nothing of it is passed on.
+        """Report once that a publisher's messages are dropped.
 
-        Its node's name may be an owner's.
+        Its node may have an owner's name.
         """
         if gid in self._refused or len(self._refused) >= MOST_REFUSED:
             return
@@ -250,10 +251,7 @@ class HeldBack:
                 self.counts[key] = self.counts.get(key, 0) + 1
 
     def report(self) -> str:
-        """Return how much was held back since the last time, and whose it is.
-
-        Empty if nothing was.
-        """
+        """Return how many transforms were blocked since the last call, and whose; empty: none."""
         now = {
             key: count for key, count in self.counts.items() if count != self._reported.get(key)
         }
@@ -279,8 +277,9 @@ class _Listener:
 class Feedback:
     """Sends foreign TF to processes that are isolated by remapping.
 
-    Moving edges go on as they come, fixed ones latched, all in one message, as long as there is a
-    subscriber. ``own`` takes the ids of its publishers; the node listens there itself.
+    While a process has subscribers, moving edges are forwarded at once and fixed ones latched, all
+    in one message. Adds the ids of its publishers to ``own``, because the node listens there
+    itself.
     """
 
     def __init__(self, node: Node, private: Mapping[str, Topics], own: set[bytes | None]) -> None:
@@ -301,29 +300,26 @@ class Feedback:
                 listener.fixed.publish(encode(self._rest(process)))
 
     def moving(self, data: bytes, sender: str) -> None:
-        """Send a message to all but the process that it is from.
-
-        Empty: it is from none of them.
-        """
+        """Send a message to all processes except its ``sender``; empty: to all."""
         for process, listener in self._listeners.items():
             if listener.moving and process != sender:
                 listener.moving.publish(data)
 
     def latch_fixed(self, source: bytes, edges: Mapping[str, SentTransform], sender: str) -> None:
-        """Latch the fixed edges of one source, by their child, at the next update."""
+        """Latch the fixed edges of one source, by child, at the next update."""
         known = self._fixed.pop(source, (sender, {}))[1]  # the newest comes last
         self._fixed[source] = (sender, {**known, **edges})
         self._outdate_all_but(sender)
 
     def forget(self, sources: Collection[bytes]) -> None:
-        """Latch the edges of these no more."""
+        """Stop latching the edges of these sources."""
         for source in [source for source in sources if source in self._fixed]:
             self._outdate_all_but(self._fixed.pop(source)[0])
 
     def sources(self, sender: str) -> list[bytes]:
-        """Return the sources of fixed edges that are from that process.
+        """Return the sources of fixed edges from that process.
 
-        Empty: from none of them.
+        Empty: those outside the plan's processes.
         """
         return [source for source, (process, _) in self._fixed.items() if process == sender]
 

@@ -44,15 +44,15 @@ _UNFENCED = "TF852"
 
 
 class Pace(Generic[Key]):
-    """When reports of each kind are due: the more often one is, the longer the next ones wait."""
+    """Due times of reports by kind: the more often one is due, the longer the next ones wait."""
 
     def __init__(self) -> None:
         self._reported: dict[Key, tuple[float, float]] = {}
 
     def is_due(self, key: Key, now: float, *, grows: bool) -> bool:
-        """Return whether a report is due, and take it as given.
+        """Return whether a report is due, and count it as made.
 
-        If it ``grows``, later ones wait.
+        If the pace ``grows``, later ones wait longer.
         """
         reported, collected_s = self._reported.pop(key, (-COLLECTED_AT_MOST_S, 0.0))
         if now - reported < collected_s:
@@ -68,14 +68,14 @@ class Pace(Generic[Key]):
 
 @dataclass(slots=True)
 class Flood:
-    """Messages of a publisher since it exceeded the limit of undeclared edges.
+    """Messages of a publisher since it exceeded the limit of undeclared edges."""
 
-    Messages, up to how long ones.
-    """
-
+    #: When it exceeded the limit, in monotonic seconds.
     since: float
+    #: The last message, in monotonic seconds.
     last: float = 0.0
     messages: int = 0
+    #: Transforms in the longest message.
     transforms: int = 0
 
     def count(self, transforms: int, now: float) -> None:
@@ -96,9 +96,7 @@ class Flood:
 class PublisherReports:
     """Publishers whose QoS or topic keeps listeners from receiving all of their messages.
 
-    Each is reported once.
-
-    That holds for as long as guards follow each other; ``changes`` counts what was reported.
+    Each is reported once, also across guards that replace each other; ``changes`` counts reports.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -113,11 +111,11 @@ class PublisherReports:
 
     @property
     def changes(self) -> int:
-        """How much was reported."""
+        """The number of reports."""
         return len(self._reported)
 
     def wrong_settings(self, publishers: Sequence[Publisher]) -> list[FindingShown]:
-        """Return findings for publishers whose quality of service no listener accepts."""
+        """Return findings for publishers with a QoS that no listener accepts."""
         return [
             found
             for publisher in publishers
@@ -144,7 +142,7 @@ class PublisherReports:
     ) -> list[Publisher]:
         """Return the run's own publishers that bypass the filter, once judged.
 
-        One that sends nothing for a while is returned then.
+        One that sends nothing is returned after a while.
         """
         outside = [
             publisher
@@ -165,7 +163,10 @@ class PublisherReports:
         ]
 
     def report_unfenced(self, publisher: Publisher, *, remapped: bool) -> list[Unfenced]:
-        """Return the finding for one of these; the fence may be of remappings."""
+        """Return the finding for a publisher that bypasses the filter.
+
+        ``remapped``: remappings isolate the others.
+        """
         topic = publisher.topic or GLOBAL[publisher.static]
         if publisher.unmarked:
             finding = unmarked_finding(
@@ -190,7 +191,7 @@ class PublisherReports:
     ) -> list[FindingShown]:
         """Return the findings for publishers of more undeclared edges than are judged.
 
-        Forget those that have left.
+        Drops those that have left.
         """
         found = []
         for gid, flooder in list(flooders.items()):
@@ -225,7 +226,8 @@ class PublisherReports:
     ) -> list[FindingShown]:
         """Return the findings for nodes that sent latched messages before they were first heard.
 
-        ``missing`` are names of fixed edges that did not come, by the node, of which others came.
+        ``missing`` has, by node, the names of fixed edges that did not come although others of the
+        node did.
         """
         found = []
         for publisher in senders.present.values() if missing else ():
@@ -240,11 +242,11 @@ class PublisherReports:
         return found
 
     def memory(self) -> tuple[tuple[str, str], ...]:
-        """Return the reports: codes with publisher ids in hexadecimal."""
+        """Return the reports made: codes with publisher ids in hexadecimal."""
         return tuple(sorted((code, gid.hex()) for code, gid in self._reported))
 
     def recall(self, memory: tuple[tuple[str, str], ...]) -> None:
-        """Take this as reported by the guard before."""
+        """Restore the reports that the previous guard made."""
         self._reported = {(code, bytes.fromhex(gid)): None for code, gid in memory}
 
     def _is_known(self, code: str, publisher: Publisher) -> bool:

@@ -1,4 +1,4 @@
-"""Starts a plan, restarts what fails and stops all of it.
+"""Starts a plan, restarts what fails and stops everything in order.
 
 ``machine`` decides: a pure function over the values of ``state`` and ``events``. ``supervisor``
 acts: it turns pipes, signals and time into events, and starts, signals and reads processes. Must

@@ -47,7 +47,7 @@ Outcome = tuple[Answer, "Event | None", "tuple[Path, dict[str, ChildCommand]] | 
 
 
 def status(state: State, now: float) -> RobotStatus:
-    """Return all that is known of a run."""
+    """Return the status of a run and of all its processes."""
     return RobotStatus(
         robot=state.plan.robot,
         host=state.plan.host,
@@ -95,7 +95,7 @@ def answer(
     base: Mapping[str, str],
     environment: Environment,
 ) -> Outcome:
-    """Return the answer, its meaning for the machine, and a new plan's file and commands."""
+    """Return the answer, the event for the machine, and a new plan's file and commands."""
     match request:
         case DownRequest():
             return Done(), request, None
@@ -153,14 +153,14 @@ def _update(
 
 
 def _plain_file(file: Path) -> bytes:
-    """Return what a plain file holds; a pipe or a device is not waited for.
+    """Return the content of a regular file, without waiting for a pipe or a device.
 
-    No more is read than the file's size: the kernel's own files, such as ``/proc/kmsg``, which a
-    reader waits for, have none.
+    Reads no more than the file's size. Kernel files such as ``/proc/kmsg``, on which a reader
+    blocks, have size 0.
 
     Raises:
-        OSError: if it is none, or is too large.
-        ValueError: if its name holds NUL.
+        OSError: if it is not a regular file, or is too large.
+        ValueError: if its name contains NUL.
     """
     descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(descriptor, "rb") as stream:
@@ -180,19 +180,19 @@ def _plain_file(file: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class PlanDifference:
-    """The processes that differ between two plans, and fixed frames that listeners keep.
+    """The difference between two plans, as far as a run has to follow it."""
 
-    ``described`` are those that differ only in the robot's description, which they take as a
-    parameter.
-    """
-
+    #: Processes that must restart.
     changed: frozenset[str]
+    #: Fixed edges that vanished. Listeners keep them until they restart.
     held: tuple[str, ...]
+    #: Processes that differ only in the robot description, a parameter they can take while they
+    #: run.
     described: frozenset[str] = frozenset()
 
 
 def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDifference:
-    """Return what differs; the folders hold the files that belong to the plans."""
+    """Return the difference; each folder holds the files that belong to its plan."""
     described = _bytes(old_folder, old.description) != _bytes(new_folder, new.description)
     before = {process.name: process for process in old.processes}
     changed, redescribed = set(), set()
@@ -214,10 +214,10 @@ _DESCRIPTION = re.compile(rb'^ +"robot_description": "[^\n]*"$', re.MULTILINE)
 
 
 def _differ_only_in_description(before: bytes | None, after: bytes | None) -> bool:
-    """Return whether two parameter files differ in the robot's description only.
+    """Return whether two parameter files differ only in the robot description.
 
-    Robot_state_publisher takes that while it runs. It never forgets a fixed frame; but for one
-    that vanishes, or moves from now on, its edges are others, and it starts anew.
+    robot_state_publisher accepts a new description while it runs, but never forgets a fixed edge.
+    If an edge vanishes or starts to move, the process's edges differ, and it restarts.
     """
     parts = [_DESCRIPTION.split(text or b"") for text in (before, after)]
     return before != after and len(parts[0]) > 1 and parts[0] == parts[1]
@@ -233,7 +233,7 @@ def _bytes(folder: Path, name: str | None) -> bytes | None:
 def _vanished_edges(old: Plan, new: Plan) -> tuple[str, ...]:
     """Return the fixed edges that vanish.
 
-    Tf2 never forgets one, so listeners keep it until they start anew.
+    tf2 never forgets a fixed edge, so listeners keep it until they restart.
     """
     children = {edge.child for edge in new.edges}
     return tuple(

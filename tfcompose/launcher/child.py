@@ -1,7 +1,7 @@
-"""One child process: bound to the launcher, leading its own group, read without waiting.
+"""One child process: bound to the launcher, leader of its own group, read without blocking.
 
 The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own
-children; for those there is the reaper.
+children. The reaper kills those.
 """
 
 from __future__ import annotations
@@ -62,33 +62,32 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 
 @dataclass(frozen=True, slots=True)
 class ChildCommand:
-    """Program and arguments, environment, and folder.
-
-    ``process`` is that of the plan, whose settings hold for it; ``own`` says that it is one of
-    tfcompose's. ``fence`` is a file that must be there first, and what it holds. ``load`` is what
-    a container is asked instead of starting anything. ``missing`` says, of a process that the run
-    goes on without, why it cannot be started.
-    """
+    """The command of a process: arguments, environment and working directory."""
 
     argv: tuple[str, ...]
     env: dict[str, str]
     folder: Path
+    #: True: one of tfcompose's own processes.
     own: bool = False
+    #: The plan's process, whose settings apply to the child.
     process: PlanProcess | None = None
+    #: Path and content of a profile file that must exist before the start.
     fence: tuple[Path, str] | None = None
+    #: The reason why it cannot be started, if the run goes on without it.
     missing: str = ""
+    #: A component: the request to its container, sent instead of starting a process.
     load: LoadRequest | None = None
 
 
 class Lines:
-    """Bytes into lines. What is kept between two calls is never longer than the limit."""
+    """Splits bytes into lines, and keeps no more than the limit between two calls."""
 
     def __init__(self, limit: int = LINE_LIMIT) -> None:
         self._limit = limit
         self._rest = b""
 
     def feed(self, data: bytes) -> Iterator[str]:
-        """Yield the lines that are complete now, and pieces of a line that is too long."""
+        """Yield the lines completed by ``data``, and pieces of a line that exceeds the limit."""
         *complete, self._rest = (self._rest + data).split(b"\n")
         for line in complete:
             yield from self._pieces(line)
@@ -97,7 +96,7 @@ class Lines:
             yield _text(piece)
 
     def end(self) -> Iterator[str]:
-        """Yield what follows the last line's end, if anything does."""
+        """Yield the rest after the last newline, if there is any."""
         if self._rest:
             yield _text(self._rest)
         self._rest = b""
@@ -108,15 +107,12 @@ class Lines:
 
 
 def _text(line: bytes) -> str:
-    """Return the line as a terminal shows it in the end: a progress bar overwrites itself."""
+    """Return the line as a terminal finally shows it: a progress bar overwrites itself."""
     return line.rstrip(b"\r").rpartition(b"\r")[2].decode(errors="replace")
 
 
 class Bucket:
-    """How much more of a process's output is taken now, for all its pipes together.
-
-    And what was thrown away.
-    """
+    """Rate limit for a process's output, over all its pipes, with a count of the dropped bytes."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -126,7 +122,7 @@ class Bucket:
         self.thrown = 0
 
     def take(self, size: int) -> bool:
-        """Return whether so many bytes are taken."""
+        """Return whether ``size`` bytes are accepted now."""
         now = self._clock()
         self._left = min(BURST, self._left + (now - self._at) * PER_SECOND)
         self._at = now
@@ -138,7 +134,7 @@ class Bucket:
 
 
 class Pipe:
-    """The end of a pipe that the launcher reads. ``sink`` is given each line."""
+    """The launcher's end of a pipe. ``sink`` receives each line."""
 
     def __init__(
         self,
@@ -155,9 +151,9 @@ class Pipe:
         os.set_blocking(file.fileno(), False)
 
     def read(self) -> int | None:
-        """Pass on some of what is there to read.
+        """Pass on some of the available bytes.
 
-        How many bytes, 0 at the end, None if nothing is there now.
+        Returns the number of bytes: 0 at the end, None if nothing is available now.
         """
         try:
             data = self.file.read(READ_SIZE)
@@ -185,7 +181,7 @@ class Pipe:
         self._tail = kept
 
     def _catch_up(self, bucket: Bucket) -> None:
-        """Say how much was thrown away, and go on with the end of it, from a line's beginning."""
+        """Report how much was dropped, and continue at the start of a line."""
         tail, self._tail = self._tail, b""
         if bucket.thrown and b"\n" in tail[:-1]:
             begin = tail.index(b"\n") + 1
@@ -201,7 +197,7 @@ class Pipe:
             self._sink(line)
 
     def drain(self) -> None:
-        """Pass on what is left of a process that has ended, then close."""
+        """Pass on the remaining output of a process that has ended, then close."""
         left = DRAIN_LIMIT
         try:
             while left > 0 and (count := self.read()):
@@ -228,35 +224,35 @@ class Child:
 
     @property
     def last_lines(self) -> tuple[str, ...]:
-        """Its last lines of output, stderr last, because two pipes have no common order."""
+        """Its last lines of output, stderr last because two pipes have no common order."""
         return (*self.last_out, *self.last_err)[-LAST_LINES:]
 
 
 class Running(Protocol):
-    """A process that was started: ``subprocess.Popen`` is one."""
+    """A started process; ``subprocess.Popen`` is one."""
 
     @property
     def pid(self) -> int:
-        """The process's number, which is its group's too."""
+        """The process id, also the id of its group."""
 
     @property
     def stdout(self) -> IO[bytes] | FileIO | None:
-        """The pipe of its output."""
+        """The pipe of its standard output."""
 
     @property
     def stderr(self) -> IO[bytes] | FileIO | None:
-        """The pipe of its errors."""
+        """The pipe of its standard error."""
 
     def wait(self) -> int:
-        """Wait for its end; return its exit code, or the negative number of a signal."""
+        """Wait for its end; return its exit code, or minus the number of the signal."""
 
 
 def spawn(command: ChildCommand, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
     """Start the command as the leader of a new session, with its output in pipes.
 
-    One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it
-    handles them (``tfcompose.signals``): one that comes while Python itself starts waits, and
-    neither kills it nor prints a traceback.
+    One of tfcompose's own processes starts with the ending signals blocked, and unblocks them once
+    it handles them (``tfcompose.signals``). A signal that arrives while Python starts stays
+    pending: it neither kills the process nor prints a traceback.
 
     Raises:
         OSError: if it cannot be started.
@@ -327,20 +323,20 @@ def _on_terminals(
 def has_ended(pid: int) -> bool:
     """Return whether the child has ended.
 
-    It stays a zombie, so that its group's number is not given away.
+    It stays a zombie, so that the kernel does not reuse its group id.
     """
     return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
 def kill_group(pid: int, number: int) -> None:
-    """Send the signal to the child and everything in its group."""
+    """Send the signal to the child and its group."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(pid, number)
 
 
 @contextlib.contextmanager
 def subreaper() -> Iterator[None]:
-    """Adopt orphaned descendants in place of init during the block."""
+    """Adopt orphaned descendants instead of init during the block."""
     _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
     try:
         yield
@@ -349,17 +345,14 @@ def subreaper() -> Iterator[None]:
 
 
 def end_with(parent: int, number: signal.Signals) -> None:
-    """Have the kernel send this process the signal when its parent dies, or at once if it has."""
+    """Have the kernel send this process the signal when its parent dies, at once if it is dead."""
     _LIBC.prctl(_PR_SET_PDEATHSIG, number)
     if os.getppid() != parent:
         os.kill(os.getpid(), number)
 
 
 def reap_adopted(known: Collection[int]) -> None:
-    """Take the exit codes of children that have ended and are not known.
-
-    Those that were left to this process.
-    """
+    """Reap ended children that are not in ``known``: orphans adopted by this process."""
     with contextlib.suppress(ChildProcessError):
         while found := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
             if found.si_pid in known:

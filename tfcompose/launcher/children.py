@@ -1,4 +1,4 @@
-"""The launcher's children: started, read, and reaped, with all that belongs to them."""
+"""The launcher's children: start, output, guard pipes and reaping."""
 
 from __future__ import annotations
 
@@ -69,11 +69,12 @@ _LEAVE_CHECK_S = 0.005
 
 
 class Children:
-    """The running processes. ``happened`` takes their events, ``notify`` their output.
+    """The running processes.
 
-    ``writer`` says, of a process and a line that it wrote, whose line it is: a container writes
-    its components'. With a run's id, what they leave behind is this process's to reap and to end.
-    What ``forker`` can start is forked; all else is executed.
+    ``happened`` receives their events and ``notify`` their output. ``writer`` maps a process and
+    one of its lines to the process that wrote it: a container also writes the lines of its
+    components. With a run id, this process also reaps and ends the orphans that they leave behind.
+    ``forker`` forks the commands that it can; all others are executed.
     """
 
     def __init__(  # noqa: PLR0913, PLR0917 (made in one place)
@@ -104,7 +105,7 @@ class Children:
     def start(
         self, process: PlanProcess, command: ChildCommand, guard: GuardPipes | None = None
     ) -> Event:
-        """Start the process, with pipes if it is a guard, and return what came of it."""
+        """Start the process, with pipes if it is a guard; return the resulting event."""
         if process.name in self._held:
             return self._let_go(process.name)
         try:
@@ -133,7 +134,7 @@ class Children:
         return Started(process.name, child.popen.pid)
 
     def prepare(self, process: PlanProcess, command: ChildCommand) -> None:
-        """Have one of tfcompose's own join ROS; it publishes when it is started."""
+        """Let one of tfcompose's own processes join ROS; it publishes once it is started."""
         theirs, ours = os.pipe()
         try:
             self._spawn(
@@ -149,10 +150,10 @@ class Children:
             os.close(theirs)
 
     def dismiss(self) -> None:
-        """End those that are held: they will not be started, or in another way.
+        """End the held processes, which will not be started, or not in this way.
 
-        Each leaves ROS at the end of its pipe. One that is killed stays in the others' lists of
-        nodes until DDS's lease is over.
+        Each leaves ROS when its pipe closes. A killed process stays in the node lists of others
+        until its DDS lease expires.
         """
         dismissed = [self._children.pop(name) for name in self._held]
         while self._held:
@@ -174,16 +175,16 @@ class Children:
             kill_group(self._children[name].popen.pid, number)
 
     def order(self, order: GuardOrder) -> None:
-        """Tell the guard, if it runs."""
+        """Send the guard an order, if it runs."""
         if self._guard_pipes:
             self._guard_pipes.order(order)
 
     def last_lines(self, name: str) -> tuple[str, ...]:
-        """Return the last lines of the process's output; nothing if it does not run."""
+        """Return the last lines of the process's output; none if it does not run."""
         return self._children[name].last_lines if name in self._children else ()
 
     def reap(self) -> None:
-        """Take leave of those that have ended."""
+        """Reap the children that have ended."""
         for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
             # The guard's end dismisses those that are held, so that one of these may be gone by
             # now.
@@ -193,7 +194,7 @@ class Children:
             reap_adopted(self._groups() | {self._reaper.pid})
 
     def find_strays(self) -> None:
-        """Note the groups of this process's descendants, and have a reaper that knows them."""
+        """Record the groups of this process's descendants, and pass them to the reaper."""
         if not self._run_id:
             return
         if self._reaper.ended:
@@ -206,7 +207,7 @@ class Children:
         self._update_reaper()
 
     def close(self) -> None:
-        """Kill what is left: something, only if an error in the launcher itself ends it."""
+        """Kill the remaining children: some remain only if an error in the launcher ends it."""
         self.dismiss()
         for child in self._children.values():
             self._end(child)
@@ -316,10 +317,7 @@ class Children:
             self._happened(event)
 
     def _take_leavings(self, child: Child) -> None:
-        """Take what the process leaves behind.
-
-        The rest of its group, its last words, and its exit code.
-        """
+        """Collect what an ended process leaves: the rest of its group, last output, exit code."""
         kill_group(child.popen.pid, signal.SIGKILL)
         for pipe in list(child.pipes):
             self._drain(child, pipe)
@@ -339,7 +337,7 @@ class Children:
         self._reaper.watch(self._groups() | self._strays)
 
     def _groups(self) -> set[int]:
-        """Return the groups of the children, each of which leads its own."""
+        """Return the groups of the children; each child leads its own."""
         return {child.popen.pid for child in self._children.values()}
 
     def _descendants(self) -> dict[int, int]:
@@ -347,10 +345,10 @@ class Children:
 
 
 def _matcher(pattern: str) -> Callable[[str], bool]:
-    """Return a function that returns whether a line contains the pattern.
+    """Return a function that tells whether a line contains the pattern.
 
-    It raises a TimeoutError where that takes too long: ``(a|aa)+$`` needs time that doubles with
-    each character, and ``re`` cannot be stopped.
+    It raises TimeoutError if the match takes too long: ``(a|aa)+$`` takes time exponential in the
+    length of the line, and ``re`` cannot be interrupted.
     """
     compiled = regex.compile(pattern)
     return lambda line: compiled.search(line, timeout=MATCHED_WITHIN_S) is not None
@@ -363,9 +361,9 @@ def _reason(error: Exception) -> str:
 
 
 class GuardPipes:
-    """The launcher's ends of the pipes for the guard's events and for orders to it.
+    """The launcher's ends of the guard's pipes, for its events and for orders to it.
 
-    ``theirs`` are the guard's ends, which are closed here once it has them.
+    ``theirs`` are the guard's ends. The launcher closes its copies once the guard has started.
     """
 
     def __init__(self, *, joins: bool, memory: dict[str, Any]) -> None:
@@ -392,12 +390,12 @@ class GuardPipes:
             os.close(fd)
 
     def order(self, order: GuardOrder) -> None:
-        """Send the guard an order; one that is stuck gets nothing."""
+        """Send the guard an order; drop it if the guard does not read."""
         with contextlib.suppress(OSError):
             os.write(self._orders, line_of(order))
 
     def close(self) -> None:
-        """Close the launcher's end for orders; that for events is closed by whoever reads it."""
+        """Close the end for orders; the reader of events closes the other."""
         os.close(self._orders)
 
 
@@ -415,17 +413,17 @@ done
 
 
 def _ignore_signals() -> None:
-    """Ignore, from the first moment on, what ends programs; what the shell starts does so too."""
+    """Ignore the ending signals from the start; the shell's children inherit that."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 class Reaper:
-    """What ends a run whose launcher was killed: a shell that outlives the launcher by a moment.
+    """Ends a run whose launcher was killed: a shell that outlives the launcher briefly.
 
-    It kills the groups that it was given last, those of everything that descends from the
-    launcher, and then whatever carries the run's id in its environment: processes that left their
-    groups since.
+    It kills the groups last passed to ``watch``, those of all the launcher's descendants. Then it
+    kills every process with the run id in its environment, to catch those that left their groups
+    since.
     """
 
     def __init__(self, run_id: str = "") -> None:
@@ -442,21 +440,21 @@ class Reaper:
 
     @property
     def pid(self) -> int:
-        """Its process number."""
+        """Its process id."""
         return self._shell.pid
 
     @property
     def returncode(self) -> int | None:
-        """How it ended; None while it runs."""
+        """Its exit code; None while it runs."""
         return self._shell.poll()
 
     @property
     def ended(self) -> bool:
-        """Whether it was killed from outside."""
+        """Whether something else killed it."""
         return self.returncode is not None
 
     def watch(self, groups: Iterable[int]) -> None:
-        """Say which groups there are now."""
+        """Set the groups to kill."""
         watched = " ".join(map(str, sorted(groups)))
         if self._shell.stdin and watched != self._watched:
             self._watched = watched
@@ -464,7 +462,7 @@ class Reaper:
                 self._shell.stdin.write(f"{watched}\n".encode())
 
     def close(self) -> None:
-        """Let it go; the groups that it was given last are killed."""
+        """Let it end; it kills the groups it was last given."""
         if self._shell.stdin:
             if not self._watched:
                 with contextlib.suppress(BrokenPipeError):

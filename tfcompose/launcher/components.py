@@ -1,8 +1,8 @@
 """Lifecycle of components: nodes that the guard has containers load and unload.
 
-A component has no operating system's process of its own. It is started by an order to the guard,
-runs once its container has answered, and goes with the container; a guard that follows another is
-told again.
+A component has no process of its own in the operating system. An order to the guard starts it, it
+runs once its container has answered, and it ends with the container. After a restart, the guard
+gets the orders again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def take_component_answer(step: Transition, event: ComponentState) -> None:
-    """Take what a container has answered to the last order about a component."""
+    """Handle a container's answer to the last order about a component."""
     tracked, why = step.state.tracked[event.process], event.why
     match event.state:
         case "loaded" if tracked.state == "starting":
@@ -52,10 +52,7 @@ def take_component_answer(step: Transition, event: ComponentState) -> None:
 
 
 def _end_component(step: Transition, tracked: Tracked, why: str, message: str) -> None:
-    """Take a component that was not loaded, or is not there any more.
-
-    It is loaded again, or has failed.
-    """
+    """Handle a component that was not loaded, or is gone: load it again, or let it fail."""
     name = tracked.process.name
     if step.state.stop:
         step.enter(name, "stopped", why)
@@ -74,9 +71,9 @@ def _end_component(step: Transition, tracked: Tracked, why: str, message: str) -
 
 
 def order_components(step: Transition) -> None:
-    """Tell a guard that has just started what the one before it may have been told, and not done.
+    """Repeat to a guard that has just started the orders that the last one may not have finished.
 
-    It has to hear first who is absent: it forgets what it was ordered about those.
+    The absences come first, because the guard drops its orders about absent components.
     """
     for name, tracked in step.state.tracked.items():
         if tracked.process.component and tracked.state in (
@@ -94,9 +91,9 @@ _BEGINNING = 300
 
 
 def writer_of(state: State, process: str, line: str) -> str:
-    """Return whose a line is that a process wrote.
+    """Return the process that a line belongs to.
 
-    Of a container, the component's whose logger is named in it.
+    A line from a container belongs to the component whose logger it names.
     """
     components = state.components_of(process)
     if not components:

@@ -1,8 +1,8 @@
-"""The control socket: other commands send requests to the launcher, and receive its notices.
+"""The control socket: other commands send requests to the launcher and receive its notices.
 
-One request is one line of JSON, as ``tfcompose.model.messages`` describes it; each answer is one
-line, too. Whoever asks for events is sent the last ones again, and then each as it comes. Only the
-user who runs the robot is answered.
+A request is one line of JSON, as ``tfcompose.model.messages`` describes it, and so is its answer.
+A client that asks for events receives the recent ones first, then each new one. Only the user who
+runs the robot gets an answer.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class RequestRefusedError(Exception):
 
 @dataclass(slots=True, eq=False)
 class Client:
-    """Somebody at the other end."""
+    """A connected client."""
 
     connection: socket.socket
     listens: bool = False
@@ -54,7 +54,7 @@ class Client:
 
 @contextlib.contextmanager
 def _at(runtime_dir: RuntimeDir) -> Iterator[str]:
-    """Give the socket's address: a short one, because Linux takes only 107 bytes."""
+    """Give the socket's address, a short one because Linux allows only 107 bytes."""
     folder = os.open(runtime_dir.folder, os.O_DIRECTORY | os.O_RDONLY)
     try:
         yield f"{procfs.descriptor(folder)}/{runtime_dir.socket.name}"
@@ -65,7 +65,7 @@ def _at(runtime_dir: RuntimeDir) -> Iterator[str]:
 def listen(runtime_dir: RuntimeDir) -> socket.socket:
     """Return the listening socket of a robot whose lock this process holds.
 
-    One that was left there is replaced.
+    Replaces a socket left behind.
     """
     with contextlib.suppress(FileNotFoundError):
         runtime_dir.socket.unlink()
@@ -82,10 +82,10 @@ def listen(runtime_dir: RuntimeDir) -> socket.socket:
 
 
 def connect(runtime_dir: RuntimeDir) -> socket.socket:
-    """Return a connection to whoever runs the robot.
+    """Return a connection to the launcher of the robot.
 
     Raises:
-        OSError: if no launcher does, or it was stopped (by Ctrl-Z) and cannot answer.
+        OSError: if no launcher runs the robot, or it is suspended (Ctrl-Z) and cannot answer.
     """
     _ensure_it_runs(runtime_dir)
     connection = socket.socket(socket.AF_UNIX)
@@ -100,7 +100,7 @@ def connect(runtime_dir: RuntimeDir) -> socket.socket:
 
 
 def _is_suspended(pid: int) -> bool:
-    """Return whether the process was stopped, as by Ctrl-Z, and waits to be continued."""
+    """Return whether the process is suspended, as by Ctrl-Z."""
     try:
         return procfs.stat(pid).state == "T"
     except OSError:
@@ -118,10 +118,10 @@ def _ensure_it_runs(runtime_dir: RuntimeDir) -> None:
 
 
 def ask(runtime_dir: RuntimeDir, request: Request, answer: type[A]) -> A:
-    """Return the launcher's answer to one request, of the class that answers it.
+    """Return the launcher's answer to one request, as an ``answer``.
 
     Raises:
-        RefusedError: with the launcher's reason, if it does not do it.
+        RefusedError: with the launcher's reason, if it refuses.
         OSError: if no launcher runs the robot, or it does not answer.
     """
     with connect(runtime_dir) as connection:
@@ -158,21 +158,21 @@ class Control:
         selector.register(listener, selectors.EVENT_READ, self._accept)
 
     def publish(self, line: str) -> None:
-        """Send a line to all who listen, and keep it for those who come later."""
+        """Send a line to all listening clients, and keep it for later ones."""
         sent = f"{line}\n".encode()
         self._lines.append(sent)
         for client in [client for client in self._clients if client.listens]:
             self._send(client, sent)
 
     def listen(self, listener: socket.socket) -> None:
-        """Take requests at another socket from now on; clients that are connected stay."""
+        """Accept requests at another socket from now on; connected clients stay."""
         self._selector.unregister(self._listener)
         self._listener.close()
         self._listener = listener
         self._selector.register(listener, selectors.EVENT_READ, self._accept)
 
     def close(self) -> None:
-        """Send what is left, and leave."""
+        """Send the rest, and close."""
         for client in list(self._clients):
             client.connection.settimeout(0.5)
             with contextlib.suppress(OSError):

@@ -1,7 +1,7 @@
 """Events and actions of the process machine, as values.
 
-What the guard reports and what other commands request are events too; they are in
-``tfcompose.model.messages``.
+Reports from the guard and requests from other commands are events too;
+``tfcompose.model.messages`` defines them.
 """
 
 from __future__ import annotations
@@ -43,36 +43,35 @@ class StartFailed:
 
 @dataclass(frozen=True, slots=True)
 class Exited:
-    """A process ended: exit code, or minus the signal's number.
-
-    ``last_lines`` is the end of its log.
-    """
+    """A process ended."""
 
     name: str
+    #: The exit code, or minus the number of the signal.
     returncode: int
+    #: The end of its log.
     last_lines: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Signalled:
-    """The launcher was sent a signal."""
+    """The launcher received a signal."""
 
     signal: int
 
 
 @dataclass(frozen=True, slots=True)
 class OutputLost:
-    """Nobody reads the launcher's output any more."""
+    """The reader of the launcher's output is gone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """Nothing but time has passed."""
+    """Only time has passed."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeUp:
-    """The time for which the plan was to run is over."""
+    """The plan has run for the requested time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,17 +84,16 @@ class LogMatched:
 
 @dataclass(frozen=True, slots=True)
 class NewPlan:
-    """From now on another plan holds.
-
-    ``changed`` are the processes that must be started anew for it, ``held`` the fixed edges that
-    listeners still hold, ``file`` is where the plan is. ``described`` only have another
-    description, which the guard can give them while they run.
-    """
+    """Another plan applies from now on."""
 
     plan: Plan
+    #: Processes that must restart for it.
     changed: frozenset[str]
+    #: Removed fixed edges that listeners keep until they restart.
     held: tuple[str, ...] = ()
+    #: The path of the plan.
     file: str = ""
+    #: Processes with a new robot description only, which the guard can give them while they run.
     described: frozenset[str] = frozenset()
 
 
@@ -128,7 +126,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """Send the signal to the process and all of its group."""
+    """Send the signal to the process and its group."""
 
     name: str
     signal: int
@@ -136,7 +134,7 @@ class Kill:
 
 @dataclass(frozen=True, slots=True)
 class Notify:
-    """Send a notice to the person, and to clients of the control socket."""
+    """Send a notice to the user, and to clients of the control socket."""
 
     notice: Notice
 
@@ -151,14 +149,14 @@ class NotifyLate:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Send the guard an order; what a container is asked is written to the order's file."""
+    """Send the guard an order; a request for a container is written to the order's file."""
 
     order: GuardOrder
 
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """Nothing runs any more: leave with this exit code."""
+    """Nothing runs any more: exit with this code."""
 
     exit_code: int
 

@@ -1,8 +1,8 @@
 """One process of a plan, started as ``tfcompose up`` starts it: ``tfcompose exec PLAN_FILE NAME``.
 
-This program becomes the process, so that whoever supervises it (systemd, a container) supervises
-that one. Exit codes: 1 something that it needs is missing, 2 the arguments or the plan are not
-usable.
+This program becomes the process, so that a supervisor (systemd, a container) supervises the
+process itself. Exit codes: 1 something that it needs is missing, 2 the arguments or the plan are
+not usable.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _ARGUMENTS = 2
 
 
 def command_of(argv: Sequence[str], base: Mapping[str, str]) -> ChildCommand | int:
-    """Return what is executed, or an exit code after saying why nothing is."""
+    """Return the command to execute, or an exit code after printing the reason."""
     if len(argv) != _ARGUMENTS:
         return _fail("usage: tfcompose exec PLAN_FILE NAME", 2)
     file, name = Path(argv[0]), argv[1]

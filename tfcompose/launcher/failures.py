@@ -1,4 +1,4 @@
-"""The launcher's own findings, and how a process's end is put in words."""
+"""The launcher's own findings, and the wording of a process's end."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def ended_by_itself_finding(
 
 
 def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
-    """Return the finding for a guard that ended while the others run, and is started again."""
+    """Return the finding for a guard that ended while the others run, and restarts."""
     verb = "was ended by" if event.returncode < 0 else "ended with"
     blind = "no edge of the plan reaches /tf" if strict else "the tree is not watched"
     message = f"{name} {verb} {describe_exit(event.returncode)}: {blind} until it is back"
@@ -51,7 +51,7 @@ def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
 
 
 def guard_hangs(name: str, seconds: float, *, strict: bool) -> Finding:
-    """Return the finding for a guard that runs and shows no sign of life."""
+    """Return the finding for a guard that runs without a sign of life for ``seconds``."""
     blind = "passed nothing on" if strict else "watched nothing"
     message = f"{name} hangs: it has {blind} for {seconds:.0f} s"
     return finding(
@@ -60,12 +60,12 @@ def guard_hangs(name: str, seconds: float, *, strict: bool) -> Finding:
 
 
 def not_started_finding(name: str, why: str) -> Finding:
-    """Return the finding for a process that the operating system would not start."""
+    """Return the finding for a process that the operating system did not start."""
     return finding("TF808", f"{name} could not be started: {why}", None)
 
 
 def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
-    """Return the finding for a process that waits for something that cannot come."""
+    """Return the finding for a process that waits for something that cannot happen."""
     return finding(
         "TF808",
         f"{name} is not started: it waits for {other} to be {what}, and {other} {why}",
@@ -74,7 +74,7 @@ def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
 
 
 def never_clear(name: str, seconds: float) -> Finding:
-    """Return the finding for a guard that does not report whether the plan's edges are free."""
+    """Return the finding for a guard that never reports whether the plan's edges are free."""
     message = (
         f"{name} did not report within {seconds:g} s whether the plan's edges are published"
         " already"
@@ -85,7 +85,7 @@ def never_clear(name: str, seconds: float) -> Finding:
 
 
 def never_published_finding(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
-    """Return the finding for the edges of one owner that were not published in time."""
+    """Return the finding for one owner's edges that were not published in time."""
     names = list_names((edge.name for edge in edges), NAMED_AT_MOST)
     name = owner.process.name
     if owner.state == "stopped" and owner.order == 0:

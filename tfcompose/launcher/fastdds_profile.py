@@ -1,8 +1,8 @@
-"""Profile files of Fast DDS (XML), with partitions added for the writers or readers of topics.
+"""Fast DDS profile files (XML), with partitions added for the writers or readers of topics.
 
-rmw_fastrtps takes the profile that has a topic's name for its writers and readers, and nothing of
-the default one then: what a new profile does not say is taken from the default profile of the
-file, if there is one.
+rmw_fastrtps uses the profile named like a topic for its writers and readers, and then nothing of
+the default profile. So a new profile copies the file's default profile, if there is one, and adds
+the partition.
 """
 
 from __future__ import annotations
@@ -34,12 +34,13 @@ _IGNORES_ITSELF = "fastdds.ignore_local_endpoints"
 def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partitions: str) -> str:
     """Return a profile file that puts readers or writers of topics into partitions.
 
-    What ``file`` holds stays, but for its comments. A process whose readers are moved is the
-    guard: it receives nothing of what it sends itself, which would cost as much as sending it.
+    The content of ``file`` stays, except for its comments. A process whose readers are moved is
+    the guard. It does not receive its own messages, because receiving them would cost as much as
+    sending them.
 
     Raises:
-        RosError: with the reason, if it cannot be read, or puts one of the topics into a partition
-            itself.
+        RosError: with the reason, if the file cannot be read, or already puts one of the topics
+            into a partition.
     """
     root = _read(file)
     profiles = root if root.tag == "profiles" else root.find("profiles")
@@ -71,7 +72,7 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
 
 
 def _ignore_own_writers(profiles: ET.Element) -> None:
-    """Have the process's readers match no writer of the process."""
+    """Keep the process's readers from matching its own writers."""
     participant = next(
         (
             element
@@ -123,12 +124,12 @@ def _read(file: Path | None) -> ET.Element:
 
 
 class _ProfileReader:
-    """Reads XML as Fast DDS does: names stand for themselves, whatever namespace they are in.
+    """Reads XML as Fast DDS does: it ignores XML namespaces.
 
     Raises:
         ValueError: with one sentence, for a document type with its entities, or elements nested
             too deep.
-        expat.ExpatError: for what is not XML.
+        expat.ExpatError: if the text is not XML.
     """
 
     def __init__(self) -> None:

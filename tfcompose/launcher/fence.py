@@ -1,10 +1,10 @@
 """Isolation of a strict plan's processes: only the guard receives their TF.
 
-Where their rmw is Fast DDS, a profile file moves their writers into a DDS partition. Elsewhere, or
-where the plan says so, their TF topics are remapped to topics of their own: then their listeners
-are moved too, and the guard feeds the rest of the tree back to them. A remapping reaches every
-process that takes ROS arguments: one of a package, of a launch file, of tfcompose's own, and a
-command that owns an edge.
+If their rmw is Fast DDS, a profile file moves their writers into a DDS partition. Otherwise, or if
+the plan says so, their TF topics are remapped to separate topics. That moves their listeners too,
+and the guard feeds the rest of the tree back to them. A remapping reaches every process that takes
+ROS arguments: executables of packages, launch files, tfcompose's own processes, and commands that
+own an edge.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _LEAVES = re.compile(rf"\b({'|'.join(PROFILE_VARIABLES)})\b(=(?P<file>[^\s;&|]*)
 
 
 def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
-    """Return how the plan's processes are fenced off; empty: they are not.
+    """Return how the plan's processes are isolated; empty: they are not.
 
     ``base`` is their common environment.
     """
@@ -59,9 +59,9 @@ def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
 
 
 def remap_tf(plan: Plan, process: PlanProcess) -> PlanProcess:
-    """Return the process with its TF on its own topics, whatever names it uses.
+    """Return the process with its TF remapped to its own topics, under any name it uses for them.
 
-    ROS takes the first remapping that fits, so these come first.
+    ROS applies the first matching remapping, so these come first.
     """
     private = private_topics(plan).get(process.name)
     if private is None or process.component:  # what its container is asked says it
@@ -80,7 +80,7 @@ def remap_tf(plan: Plan, process: PlanProcess) -> PlanProcess:
 
 
 def find_not_remapped(plan: Plan) -> list[Finding]:
-    """Return a finding for the owners that no remapping reaches."""
+    """Return a finding for owners that no remapping reaches."""
     missed = [
         process.name
         for process in plan.processes
@@ -102,7 +102,7 @@ def find_not_remapped(plan: Plan) -> list[Finding]:
 def by_partition(
     plan: Plan, commands: Mapping[str, ChildCommand], folder: Path
 ) -> tuple[dict[str, ChildCommand], list[Finding]]:
-    """Return the commands with profiles that partition their TF, and why that fails."""
+    """Return the commands with profiles that partition their TF, and findings for failures."""
     judged = judged_topics(plan)
     fenced: dict[str, ChildCommand] = {}
     wrong: dict[tuple[str, str], list[str]] = {}
@@ -134,7 +134,7 @@ def by_partition(
 
 
 class _CannotFenceError(Exception):
-    """Why a process cannot be fenced off by a partition, and the way out."""
+    """Raised if a partition cannot isolate a process; has the reason and the way out."""
 
     def __init__(self, message: str, advice: str) -> None:
         super().__init__(message)
@@ -164,10 +164,7 @@ def _profile(plan: Plan, command: ChildCommand, topics: list[str], *, reads: boo
 
 
 def _refuse_own_profile(process: PlanProcess, command: ChildCommand) -> None:
-    """Refuse an owner whose command names another profile file by itself.
-
-    It would leave the fence.
-    """
+    """Refuse an owner whose command sets another profile file itself, and so would bypass ours."""
     match = next(filter(None, map(_LEAVES.search, command.argv)), None) if process.owns else None
     if match is None:
         return

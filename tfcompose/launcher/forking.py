@@ -1,10 +1,10 @@
-"""Own processes forked from the launcher, which has imported what they run and called none of it.
+"""Own processes forked from the launcher, which has imported their modules but called nothing.
 
-An import of ROS takes 0.2 s of a processor and 30 MB. What is forked shares the launcher's, is a
-child of the launcher like any other, and looks like a process of its own program: command line and
-environment in /proc are those that an exec would have given it, since there a run's processes are
-recognised. ROS can be forked as long as nothing has initialised it and no thread runs but those
-of LTTng, which know what a fork is.
+Importing ROS takes 0.2 s of CPU and 30 MB. A forked process shares the launcher's pages, is its
+child like any other, and looks like a separate program: /proc shows the command line and
+environment that an exec would have given it, because a run recognises its processes by these. ROS
+can be forked as long as it is not initialised and no thread runs except those of LTTng, which
+handles forks.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _shown: list[mmap.mmap] = []
 
 
 class ForkedProcess:
-    """A forked child, with what a launcher needs of a ``subprocess.Popen``."""
+    """A forked child, with the part of ``subprocess.Popen`` that a launcher needs."""
 
     def __init__(self, pid: int, stdout: int, stderr: int) -> None:
         self.pid = pid
@@ -61,18 +61,18 @@ class ForkedProcess:
         self.stderr = io.FileIO(stderr)
 
     def wait(self) -> int:
-        """Wait for its end; return its exit code, or the negative number of a signal."""
+        """Wait for its end; return its exit code, or minus the number of the signal."""
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
 class Forker:
-    """Forks own processes from this one. Make it where nothing has joined ROS."""
+    """Forks own processes from this one. Create it before the process joins ROS."""
 
     def __init__(self, load: Callable[[], None], run: Callable[[], int]) -> None:
-        """Call ``load``, which imports what is shared.
+        """Call ``load``, which imports the shared modules.
 
-        ``run`` is what a forked process calls, with its command in ``sys.argv``; it returns the
-        exit code.
+        A forked process calls ``run``, with its command in ``sys.argv``; ``run`` returns the exit
+        code.
         """
         load()
         self._run = run
@@ -83,10 +83,10 @@ class Forker:
         gc.freeze()  # what a collection touches is shared no longer
 
     def can_start(self, command: ChildCommand) -> bool:
-        """Return whether a fork of this process can be the command.
+        """Return whether a fork of this process can become the command.
 
-        It has the interpreter, and what that read of the environment when it began; settings that
-        hold from the first instruction on need a program that begins anew.
+        A fork keeps the interpreter, and what the interpreter read from the environment at its
+        start. Settings that apply from the first instruction need a new program.
         """
         process = command.process
         plain = process is None or not (process.emulate_tty or has_settings(process))
@@ -131,10 +131,10 @@ class Forker:
         pass_fds: tuple[int, ...],
         mask: Collection[int],
     ) -> NoReturn:
-        """Be the command's process, and end with it.
+        """Become the command's process, and exit with it.
 
-        The launcher's objects stay alive: one that was collected here would close a descriptor
-        that is another's by now.
+        The launcher's objects stay alive: collecting one here would close a descriptor number that
+        something else may use by now.
         """
         code = 1
         try:
@@ -163,7 +163,7 @@ class Forker:
 
 
 class Tracing:
-    """LTTng's part of a fork, where ROS is built with it: its threads begin anew in the child."""
+    """LTTng's part of a fork, if ROS is built with it: its threads restart in the child."""
 
     def __init__(self) -> None:
         self._signals = ctypes.create_string_buffer(_SIGSET_SIZE)
@@ -179,7 +179,7 @@ class Tracing:
 
     @contextmanager
     def forked(self) -> Iterator[None]:
-        """Have LTTng hold its locks during the block, which forks this process."""
+        """Have LTTng hold its locks during the block, in which this process forks."""
         parent = os.getpid()
         self._call("before_fork")
         try:
@@ -193,13 +193,13 @@ class Tracing:
 
 
 def _differs_early(ours: Mapping[str, str], theirs: Mapping[str, str]) -> bool:
-    """Return whether the environments differ in what is read before ROS is initialised."""
+    """Return whether the environments differ in variables read before ROS is initialised."""
     differing = {name for name, _ in ours.items() ^ theirs.items()}
     return not all(name.startswith(_READ_LATE) for name in differing)
 
 
 def _leave(launcher: int, output: tuple[int, int], pass_fds: tuple[int, ...]) -> None:
-    """Leave what is the launcher's: its session, handlers, descriptors and output."""
+    """Drop what belongs to the launcher: its session, handlers, descriptors and output."""
     os.setsid()
     end_with(launcher, signal.SIGKILL)
     signal.set_wakeup_fd(-1)
@@ -246,8 +246,8 @@ class _MemoryMap(ctypes.Structure):
 def show_as(argv: Collection[str], env: Mapping[str, str]) -> bool:
     """Have /proc show this command line and environment of this process, as after an exec.
 
-    Return whether the kernel does: it needs no rights, but CONFIG_CHECKPOINT_RESTORE, which the
-    kernels of distributions have.
+    Return whether the kernel supports that. It needs no privileges, only
+    CONFIG_CHECKPOINT_RESTORE, which distributions' kernels enable.
     """
     arguments = b"".join(os.fsencode(argument) + b"\0" for argument in argv)
     variables = b"".join(os.fsencode(f"{name}={value}") + b"\0" for name, value in env.items())

@@ -1,7 +1,7 @@
 """Kernel settings of a process: applied before its program starts, and checked beforehand.
 
-A setting is a row of ``SETTINGS``: the process's key, what sets it for the calling process, and
-what asks beforehand without leaving a trace in this one.
+A setting is a row of ``SETTINGS``: the process's key, a function that applies it to the calling
+process, and one that checks it without changing this process.
 """
 
 from __future__ import annotations
@@ -24,23 +24,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class KernelSetting:
-    """A key of a process that the kernel follows.
-
-    ``apply`` has this process so, and what it becomes and starts; it raises OSError or ValueError
-    where the kernel refuses that. ``refusal`` returns why it would, by the process's name and the
-    value.
-    """
+    """A key of a process that the kernel enforces."""
 
     key: str
+    #: Applies a value to this process and the programs it starts. Raises OSError or ValueError if
+    #: the kernel refuses it.
     apply: Callable[[Any], None]
+    #: Returns the finding for a value that the kernel would refuse, given the process's name and
+    #: the value.
     refusal: Callable[[str, Any], Finding | None]
 
 
 def apply_settings(process: PlanProcess) -> None:
-    """Have the kernel hold this process as the plan says of it, and what it becomes and starts.
+    """Apply the plan's kernel settings to this process and the programs it starts.
 
     Raises:
-        OSError: if the kernel refuses it.
+        OSError: if the kernel refuses one.
         ValueError: if it refuses a limit.
     """
     for setting, value in _set(process):
@@ -48,13 +47,13 @@ def apply_settings(process: PlanProcess) -> None:
 
 
 def check_settings(process: PlanProcess) -> list[Finding]:
-    """Return what the kernel refuses of a process's keys; this process stays as it was."""
+    """Return findings for the settings that the kernel would refuse; this process is unchanged."""
     refusals = [setting.refusal(process.name, value) for setting, value in _set(process)]
     return [refusal for refusal in refusals if refusal]
 
 
 def has_settings(process: PlanProcess) -> bool:
-    """Return whether the plan has the kernel hold the process in some way."""
+    """Return whether the plan has kernel settings for the process."""
     return any(_set(process))
 
 
@@ -85,7 +84,7 @@ def _apply_schedule(schedule: Schedule) -> None:
 
 
 def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
-    """Return what the kernel refuses of a schedule, which a thread asks that ends."""
+    """Return the finding for a refused schedule, tried on a short-lived thread."""
     try:
         with ThreadPoolExecutor(1) as thread:
             lacking = set(schedule.cpus) - thread.submit(_cpus_with, schedule).result()
@@ -108,7 +107,7 @@ def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
 
 
 def _cpus_with(schedule: Schedule) -> set[int]:
-    """Have the kernel schedule this thread so, for good, and return its processors then."""
+    """Apply the schedule to this thread for good, and return its processors."""
     _apply_schedule(schedule)
     return os.sched_getaffinity(0)
 
@@ -123,7 +122,7 @@ def _apply_score(score: int) -> None:
 
 
 def _score_refusal(name: str, score: int) -> Finding | None:
-    """Return that a score is refused: only one below the lowest since a privileged start is."""
+    """Return the finding for a refused score: one below the lowest since a privileged start."""
     before = int(_SCORE.read_text(encoding="utf-8"))
     if score >= before:
         return None
@@ -145,7 +144,7 @@ def _apply_open_files(count: int) -> None:
 
 
 def _open_files_refusal(name: str, count: int) -> Finding | None:
-    """Return that a limit is refused: above the hard one without a right, or the kernel's."""
+    """Return the finding for a refused limit: above the hard limit, or above the kernel's."""
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     if count <= before[1]:
         return None

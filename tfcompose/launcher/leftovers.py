@@ -1,7 +1,7 @@
 """Processes that a run left behind, and a launcher's descendants.
 
-The first have the run's id in their environment. Both are found also where they left their group
-and session; the first also where the launcher was killed.
+Leftovers have the run id in their environment. Both are found even if they left their group and
+session; leftovers even if the launcher was killed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ KILLED_WITHIN_S = 5.0
 
 
 def descendants(ancestor: int, but: int) -> dict[int, int]:
-    """Return the group of each descendant of ``ancestor``, without ``but`` and its own."""
+    """Return the group of each descendant of ``ancestor``, except ``but`` and its descendants."""
     running: dict[int, procfs.Stat] = {}
     for pid in procfs.pids():
         with contextlib.suppress(OSError):
@@ -43,31 +43,29 @@ def descendants(ancestor: int, but: int) -> dict[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Leftover:
-    """A process that a run started.
-
-    Its number, its run's id, its command, and when it began (clock ticks).
-
-    ``launcher`` is the number of the run's launcher if that one still runs: then nothing was left
-    behind. ``process`` is the plan's process that started it, as far as its environment names one.
-    """
+    """A process that a run started."""
 
     pid: int
+    #: The run's id.
     run: str
     command: str
+    #: In clock ticks since boot.
     began: int
+    #: The launcher's process id while it runs; the process is not left behind then.
     launcher: int | None = None
+    #: The plan's process that started it; empty if its environment does not name one.
     process: str = ""
 
 
 def launcher_mark() -> str:
-    """Return how a process of a run knows its launcher, which is this process."""
+    """Return the mark by which a run's processes identify this process as their launcher."""
     return f"{os.getpid()}:{procfs.stat('self').began}"
 
 
 def leftovers(run: str) -> list[Leftover]:
-    """Return the processes whose run's id is, or begins with, ``run``.
+    """Return the processes whose run id is ``run`` or begins with it.
 
-    "rover@0:" finds all of rover's runs.
+    "rover@0:" matches all runs of rover.
     """
     found = []
     for pid in procfs.pids():
@@ -78,7 +76,7 @@ def leftovers(run: str) -> list[Leftover]:
 
 
 def leftovers_of(pids: Iterable[int], run: str) -> list[Leftover]:
-    """Return those of these processes that run, as what this run left behind."""
+    """Return those of these processes that run, as leftovers of this run."""
     found = []
     for pid in pids:
         with contextlib.suppress(OSError):
@@ -87,14 +85,14 @@ def leftovers_of(pids: Iterable[int], run: str) -> list[Leftover]:
 
 
 def signal_leftovers(run: str, processes: Collection[str], number: signal.Signals) -> None:
-    """Send the signal to what these processes, which have ended, left behind in this very run."""
+    """Signal what these processes, now ended, left behind in this run."""
     for leftover in leftovers(run):
         if leftover.process in processes:
             _send(leftover, number)
 
 
 def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
-    """Have them end, kill those that do not, and return those that are still there."""
+    """Terminate leftovers, kill those alive after ``patience_s`` seconds; return survivors."""
     for number, wait_s in ((signal.SIGTERM, patience_s), (signal.SIGKILL, KILLED_WITHIN_S)):
         for leftover in found:
             _send(leftover, number)
@@ -127,7 +125,7 @@ def _command(pid: int) -> str:
 
 
 def _launcher(mark: str) -> int | None:
-    """Return the launcher's number if it still runs, in this network."""
+    """Return the launcher's process id if it still runs, in this network namespace."""
     number, _, since = mark.partition(":")
     with contextlib.suppress(OSError, ValueError):
         pid = int(number)
@@ -137,7 +135,7 @@ def _launcher(mark: str) -> int | None:
 
 
 def _send(leftover: Leftover, number: int) -> None:
-    """Send the signal to that very process, and to no other that was given its number since."""
+    """Send the signal to exactly that process, not to a later one with the same id."""
     with contextlib.suppress(OSError):
         descriptor = os.pidfd_open(leftover.pid)
         try:

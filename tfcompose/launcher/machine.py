@@ -1,11 +1,10 @@
 """Process machine: the next state and actions, as a function of state, event and time.
 
-The guard is started first, after what it waits for itself, and listens; once it reports that
-nobody publishes a planned edge, the others follow in the plan's order, each when what it waits for
-is there. A guard that is switched off only reports which edges are live, and nothing waits for it.
-Whatever goes wrong, or is requested, everything is stopped: a process when all that wait for it
-are gone, the guard last of all. What the guard reports while everything stops is ignored, because
-an owner that is stopped falls silent.
+The guard starts first, after the processes it waits for, and listens. Once it reports that no node
+publishes a planned edge, the others follow in the plan's order, each when its conditions are met.
+A guard that is switched off only reports which edges are live, and no process waits for it. On a
+failure or a request, everything is stopped: each process after those that wait for it, the guard
+last. Reports from the guard during the stop are ignored, because a stopped owner falls silent.
 """
 
 from __future__ import annotations
@@ -85,9 +84,9 @@ if TYPE_CHECKING:
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
-    """Return what is known after the event, and what is to be done, in that order.
+    """Return the state after the event, and the actions in order.
 
-    ``now`` is in seconds.
+    ``now`` is monotonic time in seconds.
     """
     if state.finished:
         return state, ()
@@ -98,7 +97,7 @@ def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, .
 
 
 def wake_time(state: State) -> float | None:
-    """Return when the machine next has something to do by itself: then it wants a ``Tick``."""
+    """Return when the machine next needs a ``Tick``; None if it only waits for events."""
     times, due = state.times, []
     for tracked in state.tracked.values():
         if tracked.state == "backoff":
@@ -232,7 +231,7 @@ def _take_guard_report(step: Transition, event: Event) -> None:
 
 
 def _keep(step: Transition, event: Event) -> None:
-    """Keep what the guard reports for others."""
+    """Keep the guard's report for other commands."""
     match event:
         case Remember(changed):
             step.update(memory=step.state.memory | changed)
@@ -271,11 +270,10 @@ def _complete(step: Transition, edges: int) -> None:
 
 
 def _violation(step: Transition, finding: Finding, process: str) -> None:
-    """Report what the guard found.
+    """Report the guard's finding, and stop ``process`` or everything, by the plan's policy.
 
-    By the plan's policy, ``process``, which surely did it, is stopped, or everything.
-
-    ``process`` is empty where it is not sure, or not a process of the plan.
+    ``process`` is the certain offender; empty if that is not certain, or not a process of the
+    plan.
     """
     policy = step.state.plan.guard.on_violation
     if finding.severity == "error" and policy == "stop":
@@ -288,7 +286,7 @@ def _violation(step: Transition, finding: Finding, process: str) -> None:
 
 
 def _process_of(state: State, pid: int) -> str:
-    """Return the plan's process that was started with that number; empty: none was."""
+    """Return the plan's process with that process id; empty: none has it."""
     started = (name for name, tracked in state.tracked.items() if tracked.pid == pid)
     return next(started, "")
 
@@ -296,7 +294,7 @@ def _process_of(state: State, pid: int) -> str:
 def _report_left_fence(step: Transition, finding: Finding, process: str, pid: int) -> None:
     """Report a process that bypasses a strict plan's filter, and stop it by policy.
 
-    ``process`` is empty where one of the plan's started ``pid``, and nothing says which.
+    ``process`` is empty if a process of the plan started ``pid``, but it is unknown which.
     """
     if step.state.plan.guard.on_violation == "stop":
         _violation(step, finding, process)
@@ -330,12 +328,12 @@ def _with_note(finding: Finding, text: str) -> Finding:
 
 
 def _expect_no_sign_of_life(step: Transition) -> None:
-    """Expect nothing of the guard until it has reported once that it works."""
+    """Expect no sign of life from the guard until its first one."""
     step.update(guard_alive=None, guard_overdue=None)
 
 
 def _guard_due(state: State) -> float | None:
-    """Return when the guard is overdue, or taken to hang; None if nothing is expected of it."""
+    """Return when the guard is overdue, or counts as hung; None if no sign of life is expected."""
     if (
         state.guard is None
         or state.guard_alive is None
@@ -364,7 +362,7 @@ def _kill_a_guard_that_hangs(step: Transition) -> None:
 
 
 def _settle(step: Transition) -> None:
-    """Do what is due, now that the event has been taken in."""
+    """Do what is due after the event."""
     state = step.state
     if state.begun is None:
         return
@@ -420,15 +418,12 @@ def _go_on(step: Transition) -> None:
 
 
 def _before_clear(state: State) -> tuple[str, ...]:
-    """Return what starts before the guard has listened.
-
-    Itself, and what it waits for, such as a Zenoh router.
-    """
+    """Return what starts before the guard has listened: itself and its prerequisites."""
     return (state.guard, *state.tracked[state.guard].process.after) if state.guard else ()
 
 
 def _reminder_due(state: State) -> float | None:
-    """Return when missing edges are to be named; None if there is nothing new to name."""
+    """Return when to name the missing edges; None if there are no new ones."""
     if state.clear is None or state.complete or not state.awaited:
         return None
     if state.reminded is None:

@@ -1,13 +1,13 @@
 """Output of the launcher and its processes: to the terminal, the control socket and log files.
 
-The robot does not wait for its reader: a terminal that was stopped, a pipe to a pager. What cannot
-be written at once is kept, up to a limit; beyond it, lines of processes are left out and counted,
-and they are in the logs.
+The robot never waits for its reader, such as a suspended terminal or a pipe to a pager. Output
+that cannot be written at once is kept, up to a limit. Beyond it, lines of processes are dropped
+from the output and counted; the logs have them.
 
-A log is one file for each process, ``TIME TEXT`` a line, rotated when it is full. The times are
+Each process has one log file with lines ``TIME TEXT``, rotated when it is full. The times are
 local, with milliseconds and zone, so that lines of several files can be merged. The file ``runs``
-beside them has a line for each run, when it began. A disk that is full costs lines, and stops
-nobody.
+beside them has one line per run, with its start time. A full disk costs log lines, and stops no
+process.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ class NonBlockingOutput:
         return bool(self._owed)
 
     def write(self, text: str, *, log: bool = False) -> None:
-        """Write what can be written now; a log line is left out where too much is kept already.
+        """Write as much as possible now; drop a log line if too much is pending.
 
         Raises:
-            OSError: if the reader has gone.
+            OSError: if the reader is gone.
         """
         limit = KEPT if log else 2 * KEPT
         if len(self._owed) > limit:
@@ -79,10 +79,10 @@ class NonBlockingOutput:
         self.push()
 
     def push(self) -> None:
-        """Write what can be written now.
+        """Write as much as possible now.
 
         Raises:
-            OSError: if the reader has gone.
+            OSError: if the reader is gone.
         """
         while self._owed:
             if not self._own and not select.select([], [self.fd], [], 0)[1]:
@@ -103,14 +103,14 @@ class NonBlockingOutput:
             self._announced = self._announced if self._owed else 0
 
     def finish(self, patience_s: float = 0.5) -> None:
-        """Write the rest, as far as the reader takes it in that time, and drop what remains."""
+        """Write the rest, drop what the reader does not take within ``patience_s`` seconds."""
         with contextlib.suppress(OSError):
             while self._owed and select.select([], [self.fd], [], patience_s)[1]:
                 self.push()
         self._owed.clear()
 
     def close(self) -> None:
-        """Write the rest, as far as the reader takes it, and let the terminal or pipe go."""
+        """Write the rest as far as the reader takes it, and release the terminal or pipe."""
         try:
             self.finish()
         finally:
@@ -119,10 +119,10 @@ class NonBlockingOutput:
 
 
 def _not_waiting(fd: int) -> tuple[int, bool]:
-    """Return a descriptor for the same thing that never waits, and whether it is one.
+    """Return a non-blocking descriptor for the same file, and whether it is a new one.
 
-    The flag belongs to what was opened, which others share; so pipes and terminals are opened once
-    more. Regular files never wait.
+    The flag belongs to the open file description, and other processes share it, so pipes and
+    terminals are opened again. Regular files never block.
     """
     kind = os.fstat(fd).st_mode
     if stat.S_ISREG(kind):
@@ -134,10 +134,10 @@ def _not_waiting(fd: int) -> tuple[int, bool]:
 
 
 class EventStream:
-    """A file or pipe with each notice but log lines, as ``tfcompose events --format json``.
+    """A file or pipe with each notice except log lines, as ``tfcompose events --format json``.
 
     Raises:
-        OSError: if the file cannot be opened; ENXIO for a named pipe that nobody reads.
+        OSError: if the file cannot be opened; ENXIO for a named pipe without a reader.
     """
 
     def __init__(self, path: str) -> None:
@@ -151,7 +151,7 @@ class EventStream:
         """Write a notice; keep what the reader does not take now.
 
         Raises:
-            OSError: if the reader has gone.
+            OSError: if the reader is gone.
         """
         self._output.write(f"{line}\n")
 
@@ -159,7 +159,7 @@ class EventStream:
         """Write what was kept, as far as the reader takes it now.
 
         Raises:
-            OSError: if the reader has gone.
+            OSError: if the reader is gone.
         """
         if self._output.owes:
             self._output.push()
@@ -172,10 +172,10 @@ class EventStream:
 
 
 class Notifier:
-    """Passes notices on to the person at the output, and to whoever listens at the control socket.
+    """Passes notices to the user's output and to clients of the control socket.
 
-    ``lost`` is called once, when the reader of the ``output`` or of ``events`` has gone,
-    ``refresh`` now and then.
+    Calls ``lost`` once, when the reader of ``output`` or ``events`` is gone, and ``refresh``
+    regularly.
     """
 
     def __init__(  # noqa: PLR0913 (made in one place)
@@ -200,14 +200,14 @@ class Notifier:
             selector.register(events.fd, selectors.EVENT_READ, self._lose_events)
 
     def listen(self, listener: socket, answer: Callable[[Request], ProcessMessage]) -> None:
-        """Take requests of other commands at the control socket, in place of the one before."""
+        """Take requests of other commands at this control socket instead of the last one."""
         if self._control:
             self._control.listen(listener)
         else:
             self._control = Control(listener, self._selector, answer)
 
     def close(self) -> None:
-        """Let all go who listen."""
+        """Disconnect all clients."""
         if self._control:
             self._control.close()
         if self._events:
@@ -224,10 +224,7 @@ class Notifier:
             self._try(partial(self._report, notice))
 
     def catch_up(self) -> None:
-        """Bring what is shown up to date.
-
-        Have what is owed written when its reader is ready again.
-        """
+        """Refresh the view, and have pending output written when its reader is ready again."""
         if self._refresh and self._report:
             self._try(self._refresh)
         self._try_events(EventStream.push)
@@ -287,10 +284,11 @@ class _Log:
 
 @dataclass(slots=True)
 class Logs:
-    """The log files of one run, in ``folder``."""
+    """The log files of one run."""
 
     folder: Path
     file_bytes: int = FILE_BYTES
+    #: Lines that could not be written.
     lost: int = 0
     _open: dict[str, _Log] = field(default_factory=dict)
     _has_begun: bool = False
@@ -299,7 +297,7 @@ class Logs:
     _stamp: tuple[str, str] = ("", "")
 
     def write(self, process: str, text: str) -> str | None:
-        """Append a line; return why that failed, the first time, and None otherwise."""
+        """Append a line; return the reason for the first failure, else None."""
         stamp = self._time(time.time())
         if time.monotonic() - self._failed < LEFT_ALONE_S:
             self.lost += 1
@@ -361,7 +359,7 @@ class Logs:
 
 
 def _ensure_own(folder: Path) -> None:
-    """Refuse another user's folder, as in a shared ROS_LOG_DIR, and links elsewhere.
+    """Refuse another user's folder, as in a shared ROS_LOG_DIR, and links.
 
     Raises:
         OSError: if it is a link, or another user's.
@@ -374,7 +372,7 @@ def _ensure_own(folder: Path) -> None:
 
 
 def _ensure_kept(folder: Path) -> None:
-    """Refuse a folder whose owner, not root, could replace its content by a link.
+    """Refuse a folder whose owner, unless root, could replace its content with a link.
 
     Raises:
         OSError: if it is another user's.
@@ -384,18 +382,16 @@ def _ensure_kept(folder: Path) -> None:
 
 
 def logged_processes(folder: Path) -> list[str]:
-    """Return the names of the processes that have a log, the launcher's among them."""
+    """Return the names of the processes that have a log, including the launcher."""
     return sorted(
         file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log")
     )
 
 
 def last_modified(folder: Path) -> float:
-    """Return when a line was last written below the folder, in seconds since 1970.
+    """Return when a line was last written below the folder, in seconds since 1970; 0: never.
 
-    0 where there is none.
-
-    A folder's own time is only that of its last new file.
+    A folder's own time only tells when its last file was created.
     """
     return max((file.stat().st_mtime for file in folder.rglob("*.log")), default=0.0)
 
@@ -405,7 +401,7 @@ def read_logs(
 ) -> Iterator[tuple[str, str, str]]:
     """Yield (time, process, text) of these processes' lines, oldest first.
 
-    Only of those from ``begin_s`` on, and before ``end_s``, in seconds since 1970.
+    Only lines from ``begin_s`` on and before ``end_s``, in seconds since 1970.
     """
     lines: Iterator[tuple[str, str, str]]
     lines = heapq.merge(*(_lines(folder, name) for name in names), key=lambda line: line[0])
@@ -414,7 +410,7 @@ def read_logs(
 
 
 def runs_of(folder: Path) -> list[float]:
-    """Return when the runs with these logs began, in seconds since 1970, the newest last."""
+    """Return the start times of the runs with these logs, in seconds since 1970, newest last."""
     return [_instant(line) for line in _run_lines(folder)]
 
 
@@ -425,7 +421,7 @@ def _run_lines(folder: Path) -> list[str]:
 
 
 def _instant(stamp: str) -> float:
-    """Return the time of a line in seconds since 1970; 0 where the line was torn."""
+    """Return the time of a line in seconds since 1970; 0 if the line is torn."""
     try:
         return datetime.fromisoformat(stamp).timestamp()
     except ValueError:
@@ -447,14 +443,14 @@ def _lines(folder: Path, name: str) -> Iterator[tuple[str, str, str]]:
 
 
 class Follower:
-    """Reads what is added to the logs, across turning over."""
+    """Reads new lines of the logs, across rotation."""
 
     def __init__(
         self, folder: Path, names: list[str], *, back: int = 0, since_s: float = 0.0
     ) -> None:
-        """Begin at the current end, or at the first line within so many bytes before it.
+        """Begin at the current end, or at the first line within ``back`` bytes before it.
 
-        Lines from before ``since_s``, in seconds since 1970, are left out.
+        Skips lines from before ``since_s``, in seconds since 1970.
         """
         self._since_s = since_s
         self._folder, self._names = folder, names

@@ -1,12 +1,10 @@
-"""Before anything is started.
+"""Checks before the start: each process's command, and all that cannot work on this machine.
 
-The command of each process, and all that cannot work on this machine, at once.
-
-What only the starting machine knows stands in a plan as a placeholder, ``tfcompose.model.plan``
+Values that only the starting machine knows are placeholders in a plan; ``tfcompose.model.plan``
 lists them. A ROS package's program, ``${executable:PACKAGE/NAME}``, is ``lib/PACKAGE/NAME`` below
 one of the prefixes of AMENT_PREFIX_PATH, else NAME on the PATH. A launch file,
-``${launch:PACKAGE/FILE}``, is FILE in PACKAGE's share folder, anywhere below it, or at the path
-that is written; it is started as one process, ``ros2 launch`` of a wrapper around it.
+``${launch:PACKAGE/FILE}``, is FILE in PACKAGE's share folder, anywhere below it, or at the given
+path. It starts as one process: ``ros2 launch`` with a wrapper around the file.
 """
 
 from __future__ import annotations
@@ -49,13 +47,13 @@ _KINDS = ("*launch.py", "*launch.xml", "*launch.yaml", "*launch.yml")
 
 
 class Environment(Protocol):
-    """What makes a process's environment; ``own`` says that the process is one of tfcompose's."""
+    """Makes a process's environment; ``own``: the process is one of tfcompose's own."""
 
     def __call__(self, base: Mapping[str, str], ros: RosSettings, *, own: bool) -> dict[str, str]:
         """Return the environment.
 
         Raises:
-            RosError: if the plan's settings cannot be followed.
+            RosError: if the plan's settings cannot be applied.
         """
 
 
@@ -67,11 +65,9 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     environment: Environment,
     built_in: Path | None = None,
 ) -> tuple[dict[str, ChildCommand], list[Finding]]:
-    """Return each process's command, and what is wrong.
+    """Return each process's command, and the findings; start nothing if there are findings.
 
-    With anything wrong, nothing should be started.
-
-    ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
+    ``built_in`` is the folder that the plan was built in, if ``plan_file`` is a copy.
     """
     folder = built_in or plan_file.absolute().parent
     findings = [*_never_started(plan), *_check_by_tools(plan)]
@@ -159,7 +155,7 @@ def _command_of(
 
 
 def _check_by_tools(plan: Plan) -> Iterator[Finding]:
-    """Yield what tools find in the plan that has a section, or runs a command, of theirs."""
+    """Yield the findings of tools with a section or a command in the plan."""
     commands = {
         ("command", process.argv[1])
         for process in plan.managed
@@ -177,7 +173,7 @@ def _with_mark(guard: ChildCommand) -> ChildCommand:
 
 
 def _never_started(plan: Plan) -> list[Finding]:
-    """Return a finding for each process that waits for what cannot come."""
+    """Return a finding for each process that waits for something that cannot happen."""
     known = {process.name: process for process in plan.processes}
     findings = []
     for process in plan.processes:
@@ -205,7 +201,7 @@ def _never_started(plan: Plan) -> list[Finding]:
 
 
 def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]:
-    """Return why nothing can be loaded into containers, where the plan has components."""
+    """Return why containers cannot load components, if the plan has any."""
     names = [process.name for process in processes if process.component]
     if not names:
         return []
@@ -221,17 +217,14 @@ def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]
 
 
 def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
-    """Return the process's folder as an absolute path without ``..``, if the plan has one."""
+    """Return the process's folder; the plan's becomes absolute and without ``..``."""
     if process.cwd is None:
         return _here()
     return Path(os.path.normpath(build_dir / _fill(process.cwd, process, plan_file, build_dir)))
 
 
 def _here() -> Path:
-    """Return the folder that this program runs in.
-
-    Where it was removed meanwhile, the one that it was.
-    """
+    """Return the current folder, or its former path if it was removed."""
     try:
         return Path.cwd()
     except FileNotFoundError:
@@ -270,7 +263,7 @@ def _fill(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | No
 class NotFound:
     """A program that was not found.
 
-    Its process, its name, the folders searched, and what may help.
+    Its process, its name, the folders searched, and a hint.
     """
 
     process: str
@@ -281,7 +274,7 @@ class NotFound:
 
 
 def not_found(missing: Sequence[NotFound]) -> Finding:
-    """Return the one finding for all programs that were not found."""
+    """Return one finding for all programs that were not found."""
     what = ", ".join(f"{program.program} of {program.process}" for program in missing)
     message = f"{len(missing)} executables were not found: {what}"
     if len(missing) == 1:
@@ -301,7 +294,7 @@ def not_found(missing: Sequence[NotFound]) -> Finding:
 def executable_of(
     process: PlanProcess, argument: str, folder: Path, env: Mapping[str, str]
 ) -> str | NotFound:
-    """Return the path of the program that ``word`` means, or what is missing.
+    """Return the path of the program that ``argument`` names, or a NotFound.
 
     A relative path is looked up in ``folder``, a bare name on the PATH of ``env``.
     """
@@ -370,14 +363,14 @@ def _why_not(path: Path) -> str:
 
 
 def _is_launch(argument: str) -> bool:
-    """Return whether the word means a launch file."""
+    """Return whether the argument names a launch file."""
     return _LAUNCH.fullmatch(argument) is not None
 
 
 def _launch_command(
     process: PlanProcess, ros: RosSettings, argv: tuple[str, ...], env: Mapping[str, str]
 ) -> tuple[tuple[str, ...], dict[str, str]] | NotFound | Finding:
-    """Return the command and what its environment needs besides, or what is missing or wrong."""
+    """Return the command and additional variables, or what is missing or wrong."""
     parsed = _LAUNCH.fullmatch(argv[0])
     package, name = (parsed[1], parsed[2]) if parsed else ("", "")
     path = env.get("PATH", os.defpath)

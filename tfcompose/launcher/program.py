@@ -1,6 +1,6 @@
-"""Command lines of tfcompose's own processes, which take no module from the current folder.
+"""Command lines of tfcompose's own processes, which import no module from the current folder.
 
-``tfcompose.__main__`` takes that folder off Python's path before it imports anything.
+``tfcompose.__main__`` removes that folder from Python's path before it imports anything.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ ANYWHERE = "".join(ANYWHERE_PARTS)
 
 
 def is_process(argv: Sequence[str]) -> bool:
-    """Return whether a command line starts one of tfcompose's own processes, and no command.
+    """Return whether a command line starts one of tfcompose's own processes, not a command.
 
-    ``guard`` is both: the process is given a plan and its name.
+    ``guard`` is both: as a process it is given a plan and its name.
     """
     kind, *first = [*argv, "-", "-", "-"][:3]
     if kind == "guard" and any(text.startswith("-") or ":=" in text for text in first):
@@ -61,7 +61,7 @@ def run_process() -> int:
 
 
 def load_shared() -> None:
-    """Import what the processes share, and initialise nothing of ROS.
+    """Import the processes' shared modules, and initialise nothing of ROS.
 
     Raises:
         ImportError: if ROS cannot be imported.
@@ -72,15 +72,15 @@ def load_shared() -> None:
 
 
 def anywhere(python: str) -> list[str]:
-    """Return the words that start the program on any machine, with that Python."""
+    """Return the arguments that start the program on any machine, with that Python."""
     return [python, "-c", ANYWHERE]
 
 
 def without_current_folder(env: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment with a PYTHONPATH that does not mean the current folder.
+    """Return the environment with a PYTHONPATH that does not include the current folder.
 
-    An empty entry means it, such as the one that ``PYTHONPATH=/opt/lib:`` ends with. Python reads
-    some modules before any code of ours runs.
+    An empty entry includes it, such as the last one of ``PYTHONPATH=/opt/lib:``. Python imports
+    some modules before it runs any of our code.
     """
     entries = env.get(PYTHON_PATH, "").split(os.pathsep)
     kept = os.pathsep.join(entry for entry in entries if os.path.normpath(entry) != ".")

@@ -1,7 +1,7 @@
 """Start conditions and readiness of processes, and reports of those that are late.
 
-The launcher starts a process once the processes in the plan's ``after`` are in the state that it
-names. The process counts as ready when its own gate opens.
+The launcher starts a process once the processes in the plan's ``after`` have reached the named
+states. The process counts as ready when its own readiness check passes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _NAMED_AT_MOST = 4
 
 
 def unmet(state: State, tracked: Tracked) -> tuple[tuple[str, StartCondition], ...]:
-    """Return the processes that this one still waits for, each with what it is to be."""
+    """Return the processes that this one still waits for, each with its condition."""
     return tuple(
         (name, what)
         for name, what in tracked.process.after.items()
@@ -39,7 +39,7 @@ def unmet(state: State, tracked: Tracked) -> tuple[tuple[str, StartCondition], .
 
 
 def unmet_in_words(state: State, tracked: Tracked) -> str:
-    """Return what a process that was not started waits for.
+    """Return the conditions that keep a process from starting.
 
     "slam to be ready and map to be done", or "".
     """
@@ -47,7 +47,7 @@ def unmet_in_words(state: State, tracked: Tracked) -> str:
 
 
 def give_up_waiting(step: Transition) -> None:
-    """Have those fail that wait for what cannot come any more."""
+    """Fail the processes that wait for something that cannot happen any more."""
     for name, tracked in step.state.tracked.items():
         if tracked.state != "stopped" or not tracked.wanted or tracked.failed:
             continue
@@ -85,7 +85,7 @@ def has_own_gate(process: PlanProcess) -> bool:
 
 
 def order_gate(step: Transition, tracked: Tracked) -> None:
-    """Tell the guard what to watch for, and which nodes to bring into their states."""
+    """Tell the guard what to watch for, and which lifecycle nodes to bring into their states."""
     process, kind = tracked.process, gate_of(tracked.process)
     ready = process.ready
     by_edges = kind == "edges" and ready is not None
@@ -120,7 +120,7 @@ def open_gate(step: Transition, name: str, observed: str = "") -> None:
 
 
 def check_gates(step: Transition) -> None:
-    """Open the gates that no guard watches, and report those that are late."""
+    """Open the gates that the guard does not watch, and report late ones."""
     for name, tracked in step.state.tracked.items():
         if tracked.ready or not _is_awaited(tracked):
             continue
@@ -148,7 +148,7 @@ def check_gates(step: Transition) -> None:
 
 
 def late_at(state: State, tracked: Tracked) -> float | None:
-    """Return when the process is late; None if it may take its time."""
+    """Return when the process is late; None if it has no limit."""
     if tracked.ready or tracked.late or not _is_awaited(tracked):
         return None
     ready = tracked.process.ready
@@ -163,7 +163,7 @@ def late_at(state: State, tracked: Tracked) -> float | None:
 def _is_awaited(tracked: Tracked) -> bool:
     """Return whether it is expected to become ready by itself.
 
-    Of a component, whether its container was asked.
+    For a component, whether its container was asked to load it.
     """
     return tracked.state in ("running", "expected") or (
         tracked.state == "starting" and tracked.process.component is not None
@@ -171,7 +171,7 @@ def _is_awaited(tracked: Tracked) -> bool:
 
 
 def opens_at(tracked: Tracked) -> float | None:
-    """Return when a gate opens by itself."""
+    """Return when a gate opens by itself; None if it does not."""
     ready = tracked.process.ready
     waits = (
         not tracked.ready
@@ -183,7 +183,7 @@ def opens_at(tracked: Tracked) -> float | None:
 
 
 def waits_for(state: State, tracked: Tracked) -> str:
-    """Return what a process is still without, in words; "" if it is ready, or is not to run."""
+    """Return in words what a process needs to be ready; "" if it is, or must not run."""
     if (
         tracked.state == "stopped"
         and tracked.wanted
@@ -225,7 +225,7 @@ def _late(state: State, tracked: Tracked, seconds: float) -> Finding:
 
 
 def is_ready(state: State) -> bool:
-    """Return whether every process that is wanted is ready, or done, and every edge live."""
+    """Return whether every wanted process is ready or done, and every edge is live."""
     if state.clear is None or state.stop or state.awaited:
         return False
     wanted = [
@@ -237,7 +237,7 @@ def is_ready(state: State) -> bool:
 
 
 def report_progress(step: Transition) -> None:
-    """Tell, once, that all that can be was started, and that all are ready."""
+    """Report, once each, that everything that can start has started, and that all are ready."""
     _report_started(step)
     _report_ready(step)
 

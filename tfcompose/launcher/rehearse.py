@@ -1,9 +1,7 @@
-"""Check of whether a plan's share could be started on this machine.
+"""Check of whether this machine could start its share: ``tfcompose rehearse PLAN HOST``.
 
-``tfcompose rehearse PLAN HOST``.
-
-Whoever deploys runs it on a host, with the environment that the unit has, before anything changes.
-It prints the findings as one line of JSON.
+A deployment runs it on a host, with the unit's environment, before it changes anything. It prints
+the findings as one line of JSON.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def hindrances(file: Path, host: str) -> list[Finding]:
-    """Return what keeps the host's share of the plan from being started here."""
+    """Return findings that keep the host's share of the plan from starting here."""
     try:
         plan = read_plan(file.read_text("utf-8"), file.name)
     except RejectedError as error:
@@ -42,7 +40,7 @@ def hindrances(file: Path, host: str) -> list[Finding]:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Print what keeps the plan that PLAN_FILE HOST names from being started here; return 0."""
+    """Print the findings that keep the plan of PLAN_FILE HOST from starting here; return 0."""
     file, host = argv
     findings = [
         {"code": finding.code, "message": finding.message, "help": finding.help}

@@ -1,10 +1,10 @@
-"""Files of a run in its runtime directory, put back when somebody removes them.
+"""Files of a run in its runtime directory, restored when something removes them.
 
 They are the lock, the control socket, and the folder with the plan. The folder ``/run/user/UID``
-goes when the user's last session ends, unless the user lingers; cleaners remove others. Then a
-process that starts again finds no plan, and ``ps`` and ``down`` find no robot. So the launcher
-keeps what the files hold. Where it may not make the folder again, the files are in the one for
-temporary files until it may: there commands look for them, too.
+vanishes when the user's last session ends, unless the user lingers; cleaners remove other folders.
+Without the files, a restarting process finds no plan, and ``ps`` and ``down`` find no robot. So
+the launcher keeps their content. If it may not create the folder again, the files go to the folder
+for temporary files until it may. Commands look there, too.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 class RunFiles:
     """The files of the run whose lock this process holds.
 
-    ``listener`` is the control socket; who uses it closes it. ``plan_file`` is the plan; what is
-    in its folder is kept, if that is in the runtime directory.
+    ``listener`` is the control socket; its user closes it. ``plan_file`` is the plan; the content
+    of its folder is kept if that is in the runtime directory.
     """
 
     def __init__(self, runtime_dir: RuntimeDir, lock: Lock, plan_file: Path) -> None:
@@ -45,11 +45,11 @@ class RunFiles:
 
     @property
     def folder(self) -> Path:
-        """Where they are now."""
+        """Their current folder."""
         return self._runtime_dir.folder
 
     def keep(self, plan_file: Path) -> None:
-        """Keep what belongs to this plan from now on."""
+        """Keep the files of this plan from now on."""
         self.plan_file = plan_file
         folder, self._kept = plan_file.parent, {}
         if folder.is_relative_to(self._runtime_dir.folder):
@@ -60,9 +60,9 @@ class RunFiles:
             }
 
     def restore(self) -> bool:
-        """Put back what is missing, and return whether anything was.
+        """Restore missing files, and return whether any were missing.
 
-        ``listener`` and ``plan_file`` are others afterwards.
+        Afterwards ``listener`` and ``plan_file`` are new.
 
         Raises:
             OSError: if there is no folder for them.
@@ -120,7 +120,7 @@ class RunFiles:
 
 
 def _identity(file: Path | int) -> tuple[int, int]:
-    """Return what tells a file from another one that has its path later."""
+    """Return what distinguishes a file from a later one at the same path."""
     found = os.fstat(file) if isinstance(file, int) else file.lstat()
     return found.st_dev, found.st_ino
 
@@ -133,7 +133,7 @@ def _is_same(file: Path, descriptor: int) -> bool:
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Write a file that is missing; who reads it meanwhile finds all of it or none."""
+    """Write a missing file; a concurrent reader finds all of it or nothing."""
     if file.is_file():
         return
     make_private(file.parent)

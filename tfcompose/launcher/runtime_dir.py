@@ -1,6 +1,4 @@
-"""The runtime directory of a robot.
-
-A folder that only the user can open, with a lock, a control socket and the plan.
+"""The runtime directory of a robot: a private folder with a lock, a control socket and the plan.
 
 A robot is one name in one ROS domain; a host's share of it has the host in its name. Its folder is
 in XDG_RUNTIME_DIR, or else in ``/run/user/UID``, or else in ``tfcompose-UID`` below the folder for
@@ -43,7 +41,7 @@ class RuntimeDirError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """Who runs a robot: the launcher's pid, its start (seconds since 1970), the run's id."""
+    """The launcher that runs a robot: its pid, its start (seconds since 1970), the run's id."""
 
     pid: int
     since: float
@@ -52,8 +50,9 @@ class Holder:
 
 @dataclass(frozen=True, slots=True)
 class RuntimeDir:
-    """The folder of a robot in a domain; ``name`` is ROBOT@DOMAIN, or ROBOT.HOST@DOMAIN."""
+    """The folder of a robot in a domain."""
 
+    #: ROBOT@DOMAIN, or ROBOT.HOST@DOMAIN.
     name: str
     folder: Path
     logs: Path
@@ -65,7 +64,7 @@ class RuntimeDir:
 
     @property
     def share(self) -> str:
-        """The robot's name with the host whose share it is, without the domain."""
+        """The robot's name, with the host of the share, without the domain."""
         return self.name.rpartition("@")[0]
 
     @property
@@ -79,15 +78,15 @@ class RuntimeDir:
         return self.folder / "control"
 
     def plan_folder(self, digest: str) -> Path:
-        """Return where a plan with its files is copied to, so that builds do not affect a run."""
+        """Return where to copy a plan with its files, so that builds do not affect a run."""
         return self.folder / f"{_PLAN}{digest}"
 
     def plan_folders(self) -> list[Path]:
-        """Return the folders of the copies that are there."""
+        """Return the folders of the existing copies."""
         return list(self.folder.glob(f"{_PLAN}*"))
 
     def holder(self) -> Holder | None:
-        """Return who runs the robot now, or None."""
+        """Return the launcher that runs the robot now, or None."""
         try:
             descriptor = os.open(self.folder / "lock", os.O_RDWR | os.O_NOFOLLOW)
         except OSError:
@@ -112,7 +111,7 @@ class Lock:
         self.sign()
 
     def sign(self) -> None:
-        """Write down who holds it: this process, since now."""
+        """Record this process as the holder, since now."""
         self._holder = Holder(os.getpid(), time.time(), self.run)
         self._write_holder()
 
@@ -127,7 +126,7 @@ class Lock:
         self._write_holder()
 
     def close(self) -> None:
-        """Give it back."""
+        """Release it."""
         os.close(self.fd)
 
     def _write_holder(self) -> None:
@@ -136,7 +135,7 @@ class Lock:
 
 
 def _open_lock(directory: RuntimeDir) -> int:
-    """Return the descriptor of the lock, once this process holds it."""
+    """Return the descriptor of the lock once this process holds it."""
     descriptor = os.open(directory.folder / "lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
     try:
         _take(descriptor)
@@ -149,7 +148,7 @@ def _open_lock(directory: RuntimeDir) -> int:
 def _is_held(descriptor: int) -> bool:
     """Return whether a launcher runs the robot.
 
-    A check shares the lock for a moment with other checks.
+    The check briefly shares the lock with other checks.
     """
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -160,7 +159,7 @@ def _is_held(descriptor: int) -> bool:
 
 
 def _take(descriptor: int) -> None:
-    """Take the lock, or raise BlockingIOError; who only looks is waited for."""
+    """Take the lock, or raise BlockingIOError; wait for processes that only check it."""
     while True:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -184,7 +183,7 @@ def _read_holder(descriptor: int) -> Holder | None:
 def runtime_dir_of(plan: Plan, env: Mapping[str, str]) -> RuntimeDir:
     """Return the runtime directory of the plan's robot in its domain.
 
-    The folder above it is there afterwards.
+    Creates the folder above it.
 
     Raises:
         RuntimeDirError: if there is no folder that only this user can open.
@@ -195,12 +194,12 @@ def runtime_dir_of(plan: Plan, env: Mapping[str, str]) -> RuntimeDir:
 
 
 def domain_of(env: Mapping[str, str]) -> str:
-    """Return the ROS domain that the environment says."""
+    """Return the ROS domain that the environment sets."""
     return (env.get("ROS_DOMAIN_ID") or "0").strip()
 
 
 def runtime_dirs(env: Mapping[str, str]) -> list[RuntimeDir]:
-    """Return every runtime directory that a run has used and that is still there, by name.
+    """Return every existing runtime directory that a run has used, by name.
 
     Raises:
         RuntimeDirError: if there is no folder that only this user can open.
@@ -242,15 +241,15 @@ def _runtime_folder(env: Mapping[str, str]) -> Path:
 
 
 def _temporary_folder() -> Path:
-    """Return the folder of runs where there is no runtime directory of the user's."""
+    """Return the folder of runs for users without a runtime directory."""
     return Path(tempfile.gettempdir()) / f"tfcompose-{os.getuid()}"
 
 
 def substitute_of(directory: RuntimeDir) -> RuntimeDir:
-    """Return the same robot's directory where commands look while the user's folder is gone.
+    """Return the same robot's directory to use while the user's folder is gone.
 
     Raises:
-        OSError: if the folder for it is not one that only this user can open.
+        OSError: if the folder is not private to this user.
     """
     folder = _temporary_folder()
     make_private(folder)
@@ -262,7 +261,7 @@ def substitute_of(directory: RuntimeDir) -> RuntimeDir:
 def make_private(folder: Path) -> None:
     """Make a folder, and those above it, for this user alone.
 
-    But not what the system makes for users.
+    Leaves the system's folders for users alone.
 
     Raises:
         OSError: if it cannot be made.
@@ -286,7 +285,7 @@ def goes_with_logout(directory: RuntimeDir) -> bool:
 
 
 def user_name() -> str:
-    """Return this user's name; its number where there is none."""
+    """Return this user's name, or the user id if it has no name."""
     try:
         return pwd.getpwuid(os.getuid()).pw_name
     except KeyError:

@@ -73,7 +73,7 @@ class Tracked:
     order: int = 0
     #: Short runs in a row.
     failures: int = 0
-    #: Number of stop orders, each firmer than the one before.
+    #: Number of stop orders sent, each stronger than the one before.
     level: int = 0
     ready: bool = False
     wanted: bool = True
@@ -101,7 +101,7 @@ class Tracked:
 
     @property
     def was_started(self) -> bool:
-        """Whether it has run, or runs."""
+        """Whether it runs or has run."""
         return self.order > 0 and self.state != "starting"
 
 
@@ -157,7 +157,7 @@ class State:
 
     @property
     def missing(self) -> tuple[PlanEdge, ...]:
-        """The edges that were not received yet; empty without a guard."""
+        """The edges not received yet; empty without a guard."""
         return (
             ()
             if self.guard is None

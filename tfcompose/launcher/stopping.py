@@ -1,7 +1,8 @@
 """Stop of the robot or of one process, and the end of a process: restart, failure or removal.
 
-A process is first sent its own signal, then SIGTERM, then SIGKILL, each when the one before did
-not help. One that ends is started again after a while, is requested by name, or leaves the plan.
+A process first receives its own stop signal, then SIGTERM, then SIGKILL, each if the previous one
+did not help. After its end it restarts after a delay, stays stopped until requested by name, or
+leaves the plan.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 
 
 def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
-    """Return how long to wait before the restart of a process after so many failures in a row."""
+    """Return the delay in seconds before a restart after ``failures`` failures in a row."""
     if process.restart_delay is not None:
         return process.restart_delay
     return min(times.backoff_s * 2.0 ** (failures - 1), times.backoff_limit_s)
@@ -53,9 +54,9 @@ def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
 
 
 def take_process_exit(step: Transition, event: Exited) -> None:
-    """Take the end of a process: meant, to be followed by a restart, or a failure.
+    """Handle the end of a process: expected, followed by a restart, or a failure.
 
-    Components go with a container.
+    Components end with their container.
     """
     _take_end(step, event)
     lose_components(step, event.name)
@@ -103,9 +104,9 @@ def _take_end(step: Transition, event: Exited) -> None:
 
 
 def _is_to_end(state: State, process: PlanProcess) -> bool:
-    """Return whether the process is there to end.
+    """Return whether the process is expected to end.
 
-    It is ready then, or another one waits until it is done.
+    Its end makes it ready, or another process waits until it is done.
     """
     ends = process.ready is not None and process.ready.kind == "exit"
     return ends or any(
@@ -114,9 +115,9 @@ def _is_to_end(state: State, process: PlanProcess) -> bool:
 
 
 def _take_guard_exit(step: Transition, tracked: Tracked, event: Exited) -> None:
-    """Have a guard that died follow itself.
+    """Restart a guard that died.
 
-    What it reported holds, and the next one is given its memory.
+    Its reports stay valid, and the next guard receives its memory.
     """
     if not step.state.memory:
         lose_edges(step, tracked)
@@ -128,7 +129,7 @@ def _take_guard_exit(step: Transition, tracked: Tracked, event: Exited) -> None:
 
 
 def lose_edges(step: Transition, tracked: Tracked) -> None:
-    """Take the edges of a process as not live: it has ended, or is about to."""
+    """Mark the edges of a process as not live: it has ended, or is about to."""
     state, name = step.state, tracked.process.name
     step.track(name, replace(tracked, ready=False, ready_since=None, observed="", late=False))
     if name == state.guard:
@@ -145,9 +146,9 @@ def lose_edges(step: Transition, tracked: Tracked) -> None:
 
 
 def lose_components(step: Transition, container: str) -> None:
-    """Take the components of a container as gone with it.
+    """Handle components that ended with their container.
 
-    Those that are wanted come again when it is ready again.
+    Those still wanted are loaded again once it is ready again.
     """
     for tracked in step.state.components_of(container):
         if tracked.alive or tracked.state == "backoff":
@@ -167,10 +168,7 @@ def lose_components(step: Transition, container: str) -> None:
 
 
 def process_left(step: Transition, tracked: Tracked, how: str) -> None:
-    """Take a process that was meant to end as ended.
-
-    It stays so, is started again, or leaves the plan.
-    """
+    """Handle the end of a process that was meant to end: stopped, started again, or dropped."""
     name = tracked.process.name
     step.track(name, tracked)
     step.enter(name, "stopped", how, level=0, failures=0)
@@ -196,9 +194,9 @@ def _restart_after(step: Transition, tracked: Tracked, event: Exited) -> None:
 def schedule_restart(
     step: Transition, tracked: Tracked, how: str, failure: Callable[[str], Finding]
 ) -> None:
-    """Have a process started again after a while, unless it was too often.
+    """Schedule a restart after a delay, unless the process restarted too often.
 
-    ``failure`` makes the finding then.
+    In that case, ``failure`` makes the finding.
     """
     name, times = tracked.process.name, step.state.times
     most = tracked.process.restart_limit
@@ -217,7 +215,7 @@ def schedule_restart(
 
 
 def refusal(state: State, name: str, verb: Verb) -> str | None:
-    """Return why this cannot be done with that process, in one sentence; None if it can."""
+    """Return in one sentence why the process cannot do that; None if it can."""
     tracked = state.tracked.get(name)
     if tracked is None:
         advice = did_you_mean(name, state.tracked, f"it has {', '.join(state.tracked)}")
@@ -302,7 +300,7 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
 
 
 def order_descriptions(step: Transition) -> None:
-    """Have the guard give new descriptions to those that run and have not taken them."""
+    """Have the guard pass new descriptions to the running processes that do not have them yet."""
     for name, tracked in step.state.tracked.items():
         if tracked.description:
             node = tracked.process.nodes[0]
@@ -310,7 +308,7 @@ def order_descriptions(step: Transition) -> None:
 
 
 def take_description_answer(step: Transition, event: DescriptionState) -> None:
-    """Start a process anew that did not take its description."""
+    """Restart a process that did not take its description."""
     tracked = step.state.tracked[event.process]
     if not tracked.description:
         return
@@ -340,7 +338,7 @@ def _take_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked
 
 
 def stop_if_requested(step: Transition, event: Event) -> None:
-    """Begin to stop everything if that is what the event requests."""
+    """Begin to stop everything if the event requests it."""
     match event:
         case DownRequest():
             step.stop(StopReason("signal", 0, 1, step.now), "tfcompose down")
@@ -375,7 +373,7 @@ def _time_up(step: Transition) -> None:
 
 
 def edge_taken(step: Transition, finding: Finding) -> None:
-    """Stop everything, because an edge of the plan is published already.
+    """Stop everything, because another node already publishes an edge of the plan.
 
     Each such edge is reported.
     """
@@ -389,11 +387,9 @@ def edge_taken(step: Transition, finding: Finding) -> None:
 
 
 def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
-    """Return what the process is sent, each when the one before did not help.
+    """Return the process's stop signals in order: its own, SIGTERM, SIGKILL.
 
-    Its own signal, SIGTERM, SIGKILL.
-
-    To unload a component is one step, too.
+    The request to unload a component is one step, too.
     """
     if process.component:
         return (Signals[process.stop.signal],)
@@ -429,10 +425,7 @@ def send_due_signals(step: Transition) -> None:
 
 
 def _end_component(step: Transition, tracked: Tracked, level: int, container: str) -> None:
-    """Have a component unloaded, if it is time.
-
-    Where everything is stopped, it ends with its container.
-    """
+    """Unload a component when it is due; if everything stops, it ends with its container."""
     name, state = tracked.process.name, step.state
     if level and state.stop and state.tracked[container].state != "expected":
         step.enter(name, "stopped", f"with {container}")
@@ -444,10 +437,7 @@ def _end_component(step: Transition, tracked: Tracked, level: int, container: st
 
 
 def firmer_at(times: Times, tracked: Tracked) -> float | None:
-    """Return when the next signal is due.
-
-    The plan's time counts for each, or else the launcher's.
-    """
+    """Return when the next signal is due, by the plan's time limit, or else the launcher's."""
     if tracked.state != "stopping" or not 0 < tracked.level < len(stop_signals(tracked.process)):
         return None
     rule, kills = tracked.process.stop, tracked.level + 1 == len(stop_signals(tracked.process))
@@ -457,11 +447,11 @@ def firmer_at(times: Times, tracked: Tracked) -> float | None:
 
 
 def _due_level(state: State, tracked: Tracked, now: float) -> int:
-    """Return how many of its ``stop_signals`` the process should have been sent by now.
+    """Return how many of its ``stop_signals`` the process should have received by now.
 
-    The first is due when nothing runs that waits for the process, or when it alone is to end; each
-    further one a while after the one before. A second signal to the launcher makes the second due
-    at once, everywhere, and a third the third.
+    The first is due when nothing that waits for the process still runs, or when only this process
+    is to end. Each further one is due some time after the previous one. A second signal to the
+    launcher makes the second due at once for all processes, a third the third.
     """
     due = firmer_at(state.times, tracked)
     level = tracked.level + 1 if due is not None and now >= due else tracked.level

@@ -1,8 +1,8 @@
 """Runs a plan: one loop turns pipes, signals and time into events and acts on them.
 
-The launcher has one thread. Its children lead sessions of their own, so that a Ctrl-C in the
-terminal reaches the launcher alone. A process whose output comes faster than it can be passed on
-waits in its own pipe; nothing piles up here.
+The launcher has one thread. Its children lead their own sessions, so that a Ctrl-C in the terminal
+reaches only the launcher. A process that writes faster than the launcher passes on blocks on its
+own pipe; the launcher buffers nothing.
 """
 
 from __future__ import annotations
@@ -86,20 +86,20 @@ _PREPARED = ("static", "joints", "simulate")
 
 @dataclass(slots=True)
 class RunSession:
-    """The plan's file, the run's files, and an output that does not wait.
-
-    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With files,
-    what the run's processes leave behind is ended with it, also what left their groups.
-    ``refresh`` is called now and then. ``events`` gets each notice; the run ends with its reader.
-    ``forker`` has loaded what tfcompose's own processes run.
-    """
+    """Resources of a run on this machine besides its processes."""
 
     plan_file: Path
+    #: The run's lock, socket and plan. With these, the run also ends processes that left their
+    #: groups.
     files: RunFiles | None = None
+    #: The folder that the plan was built in, if ``plan_file`` is a copy.
     base: Path | None = None
     output: NonBlockingOutput | None = None
+    #: Called regularly, to update what is shown.
     refresh: Callable[[], None] | None = None
+    #: Receives each notice; the run ends when its reader does.
     events: EventStream | None = None
+    #: Has imported the modules of tfcompose's own processes.
     forker: Forker | None = None
 
     @property
@@ -110,10 +110,7 @@ class RunSession:
 
 @dataclass(frozen=True, slots=True)
 class _Environments:
-    """What commands are made with.
-
-    The launcher's environment, and what makes a process's of it.
-    """
+    """Inputs of commands: the launcher's environment, and a function for a process's."""
 
     base: Mapping[str, str]
     environment: Environment
@@ -132,12 +129,11 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
 ) -> int:
     """Run the plan until it ends, and return the exit code.
 
-    0 after a clean end, 1 after a failure or a finding.
-
-    SIGINT, SIGTERM and SIGHUP end it. ``report`` is given everything that a person should know, in
-    order; an OSError from it means that nobody reads it any more, and ends the plan.
-    ``duration_s`` is how long to run after the look before the start, in seconds. ``session`` is
-    what the run has on this machine besides its processes. Must be called in the main thread.
+    0 after a clean end, 1 after a failure or a finding. SIGINT, SIGTERM and SIGHUP end it.
+    ``report`` receives every notice for the user, in order; if it raises OSError, the reader is
+    gone, and the plan ends. ``duration_s`` is the time to run in seconds, counted from the end of
+    the observation before the start. ``session`` has the run's resources on this machine besides
+    its processes. Call it in the main thread.
     """
     state = initial(plan, times)
     processes = [
@@ -236,9 +232,9 @@ class _Supervisor:
         return self._exit_code
 
     def _prepare(self) -> None:
-        """Have publishers join ROS while the guard looks.
+        """Have publishers join ROS while the guard observes.
 
-        Where each has to import ROS first, as many as there are cores.
+        If each has to import ROS first, at most one per core.
         """
         if self._state.clear is not None or self._state.stop:
             return
@@ -271,10 +267,7 @@ class _Supervisor:
         return answer
 
     def _end(self, duration_s: float | None) -> float | None:
-        """Return when the time is up.
-
-        It counts from the end of the observation before the start.
-        """
+        """Return when the time is up, counted from the end of the observation before the start."""
         state = self._state
         if duration_s is None or state.clear is None or state.stop:
             return None
@@ -315,7 +308,7 @@ class _Supervisor:
                 pass
 
     def _restore_files(self) -> None:
-        """Put back what was removed of the run's files; a process that starts reads the plan."""
+        """Restore removed files of the run: a process that starts reads the plan."""
         session = self._session
         if session.files is None:
             return
@@ -357,7 +350,7 @@ class _Supervisor:
         )
 
     def _order_component(self, order: ComponentOrder) -> None:
-        """Write what the container is asked beside the plan, and have the guard ask it."""
+        """Write the request to the container beside the plan, and have the guard send it."""
         name = order.process
         if order.do == "load":
             text = msgspec.json.encode(self._commands[name].load).decode()
@@ -394,12 +387,10 @@ class _Supervisor:
 
 @final
 class Signals:
-    """Catches what ends a plan, and SIGCHLD so that it wakes the loop.
+    """Catches the signals that end a plan, and SIGCHLD so that it wakes the loop.
 
-    Puts everything back afterwards.
-
-    A SIGHUP that is ignored, as below ``nohup``, stays ignored. ``more`` are further signals to
-    catch.
+    Restores the handlers afterwards. A SIGHUP that is ignored, as below ``nohup``, stays ignored.
+    ``more`` are further signals to catch.
     """
 
     def __init__(self, *more: signal.Signals) -> None:
@@ -441,7 +432,7 @@ class Signals:
             os.read(self.fd, 4096)
 
     def take(self) -> Iterator[int]:
-        """Yield the signals that came since the last call, without SIGCHLD."""
+        """Yield the signals received since the last call, without SIGCHLD."""
         while self._taken:
             number = self._taken.popleft()
             if number != signal.SIGCHLD:
@@ -450,6 +441,6 @@ class Signals:
                 self._children_changed = True
 
     def take_children_changed(self) -> bool:
-        """Return whether SIGCHLD was among those that ``taken`` has passed since the last call."""
+        """Return whether SIGCHLD was among the signals that the last ``take`` consumed."""
         changed, self._children_changed = self._children_changed, False
         return changed

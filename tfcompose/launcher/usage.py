@@ -1,4 +1,4 @@
-"""Usage of process groups: processors and memory."""
+"""CPU and memory usage of process groups."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class UsageMeter:
         return members
 
     def usage(self, groups: Collection[int]) -> dict[int, tuple[float, int]]:
-        """Return (cores, bytes) for each group that has processes; the memory is proportional.
+        """Return (cores, bytes) for each group that has processes.
 
-        The cores are those since the last call; a process that began since then counts from the
-        next one on.
+        The memory is proportional (PSS). The cores are averages since the last call; a process
+        that began since then counts from the next call on.
         """
         at, before = self._at, self._ticks
         members = self.begin(groups)

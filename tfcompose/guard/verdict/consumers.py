@@ -43,7 +43,7 @@ FEWEST = 3
 
 
 def data_frame_unknown(state: TreeState) -> Iterator[Finding]:
-    """Data come in a frame that is not in the tree."""
+    """Sensor data arrive in a frame that is not in the tree."""
     frames = {frame for edge in state.taken for frame in (edge.parent, edge.child)}
     for each in state.stamped:
         if each.frame in frames or not frames:
@@ -147,9 +147,9 @@ def late_stamps(state: TreeState) -> Iterator[Finding]:
 
 
 def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, float, EdgeState]]:
-    """Return of the edge above the data that is behind the others.
+    """Return the moving edge above the data that lags most: none or one.
 
-    How far it is behind the data, and their age.
+    With its lag behind the data and the age of the data, in seconds.
     """
     if len(each.delays_s) < FEWEST:
         return []
@@ -159,7 +159,7 @@ def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, floa
 
 
 def keeps_data_waiting(state: TreeState) -> set[tuple[str, str]]:
-    """Return the edges, parent and child, whose stamps lag data that need them.
+    """Return the edges (parent, child) whose stamps lag behind data that need them.
 
     They are reported with the data.
     """
@@ -170,10 +170,7 @@ def keeps_data_waiting(state: TreeState) -> set[tuple[str, str]]:
 def _off_clock(
     state: TreeState, each: StampedData, edge: EdgeState, age_s: float, *, simulated: bool
 ) -> str:
-    """Return how data are of another clock than an edge.
-
-    Nothing where they are only late or ahead.
-    """
+    """Return how the data's clock differs from an edge's; empty if they are only late or ahead."""
     if each.stamp_ns is None or KEPT_S < abs(age_s) < HOUR_S:
         return ""
     apart_ns = (

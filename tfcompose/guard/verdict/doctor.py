@@ -1,4 +1,4 @@
-"""Everything that is wrong with a tree: small functions from its state to findings, in order."""
+"""Diagnosis of a tree: small functions from its state to findings, in order."""
 
 from __future__ import annotations
 
@@ -28,18 +28,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What was found, and what was observed: edges, publishing nodes, seconds, the trees' roots.
-
-    ``elsewhere`` are topics with TF that were not observed, ``costs`` a sentence for each topic on
-    what it costs.
-    """
+    """Findings of the doctor, and what it observed."""
 
     findings: list[Finding]
+    #: Number of observed edges.
     edges: int
+    #: Number of publishing nodes.
     nodes: int
+    #: Duration of the observation.
     seconds: float
+    #: Root frames of the trees.
     roots: tuple[str, ...] = ()
+    #: Topics with TF that were not observed.
     elsewhere: tuple[str, ...] = ()
+    #: One sentence about the traffic of each topic.
     costs: tuple[str, ...] = ()
 
 
@@ -88,7 +90,7 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
 
 
 def diagnose(state: TreeState) -> list[Finding]:
-    """Return everything that is wrong, errors first, else in the order of the checks."""
+    """Return all findings: errors first, then in the order of the checks."""
     findings = [finding for diagnosis in DIAGNOSES for finding in diagnosis(state)]
     return sorted(dict.fromkeys(findings), key=lambda finding: finding.severity)
 
@@ -126,7 +128,7 @@ _SINGLE_FROM = 3
 def cost(state: TreeState) -> str:
     """Return the traffic on the topic of moving edges; empty without messages.
 
-    Each message goes to each listener: what sends several edges does so with one.
+    Each message goes to each listener, so a node should send its edges in one message.
     """
     messages = sum(count.messages for count in state.sent.values())
     if not messages or not state.seconds:

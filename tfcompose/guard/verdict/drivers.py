@@ -1,8 +1,8 @@
-"""Sensors' drivers against their presets: frames, poses and switches that differ from the preset.
+"""Sensor drivers against their presets: frames, poses and switches that differ.
 
-A driver sends what its device was calibrated to, which is a few millimetres from nominal; far from
-it the device is another one than the preset's. What a preset calls exact, such as the turn of an
-optical frame, no device changes.
+A driver sends its device's calibration, a few millimetres from nominal. A pose far from nominal
+belongs to another device than the preset's. No device changes a pose that a preset calls exact,
+such as the rotation of an optical frame.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
 
 
 def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
-    """Return whether the plan, and no preset, gives the pose of this process's frame.
+    """Return whether the plan itself, not a preset, gives the pose of this process's frame.
 
-    Another owner's pose is the identity where the robot says none.
+    The pose of another owner's frame is the identity if the robot file has none.
     """
     if edge.kind != "static" or any(driven.publishes for driven in owner.drives):
         return False
@@ -58,7 +58,7 @@ def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
 
 
 def fixed_driver_edges(plan: Plan) -> dict[str, PlanEdge]:
-    """Return the fixed edges with a pose that others than ``static`` own, by child."""
+    """Return the fixed edges with a pose whose owner is not ``static``, by child."""
     known, owners = expected_frames(plan), {process.name: process for process in plan.processes}
     return {
         edge.child: edge
@@ -72,7 +72,7 @@ def fixed_driver_edges(plan: Plan) -> dict[str, PlanEdge]:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """A frame that a driver publishes, and whether its pose is nominal only."""
+    """A frame that a driver publishes, and whether its pose is only nominal."""
 
     edge: PlanEdge
     driven: Driven
@@ -92,7 +92,7 @@ def expected_frames(plan: Plan) -> dict[str, Expected]:
 
 
 def is_pose(sent: Pose) -> bool:
-    """Return whether tf2 takes the pose."""
+    """Return whether tf2 accepts the pose."""
     return (
         all(map(isfinite, (*sent.xyz, *sent.quat_xyzw)))
         and abs(norm(sent.quat_xyzw) - 1) < UNIT_WITHIN
@@ -140,7 +140,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SentPose:
-    """Transforms of a frame that a driver or owner sends, as compared with the plan."""
+    """Transforms of a frame from a driver or owner, compared with the plan."""
 
     expected: Expected | PlanEdge
     pose: Pose
@@ -158,9 +158,9 @@ def _edge_of(expected: Expected | PlanEdge) -> PlanEdge:
 
 
 class SentPoses:
-    """The poses of frames that drivers and other owners publish, message by message.
+    """Poses of frames that drivers and other owners publish, message by message.
 
-    A publisher is compared once for each frame, where the rmw says who sent a message.
+    Each publisher is compared once per frame, if the rmw identifies the sender of a message.
     """
 
     def __init__(self, plan: Plan, publishers: Publishers) -> None:
@@ -173,7 +173,7 @@ class SentPoses:
         self._waiting: list[SentPose] = []
 
     def follow(self, plan: Plan) -> None:
-        """Compare with another plan's poses; those that are new, with what comes from now on."""
+        """Compare with another plan's poses; for changed ones, use messages from now on."""
         before = self._expected
         self._expected = {**fixed_driver_edges(plan), **expected_frames(plan)}
         self._received = {
@@ -183,7 +183,7 @@ class SentPoses:
         }
 
     def take(self, message: Message) -> None:
-        """Note the poses that a message brings along."""
+        """Record the poses in a message."""
         if message.gid is None or not self._expected:
             return
         for (parent, child), pose in zip(message.edges, message.poses, strict=False):
@@ -239,7 +239,7 @@ def not_taken(
 ) -> list[Finding]:
     """Return a finding for each parameter of the node that differs from the plan.
 
-    None: it has no such one.
+    ``found`` has the node's values; None: it does not declare the parameter.
     """
     return [
         _not_taken(node, name, value, found[name], drives)

@@ -1,9 +1,8 @@
 """Faults of publishers against a plan, and their findings.
 
-A ``Fault`` is one edge that came from a publisher that may not send it, or in a way that it may
-not. The guard finds faults message by message, verify and the doctor at the end.
-``fault_finding`` is the finding for faults of one code and one publisher's name; ``_SENTENCES``
-has a function for each code.
+A ``Fault`` is an edge from a publisher that must not send it, or not in this way. The guard finds
+faults message by message, verify and the doctor at the end. ``fault_finding`` is the finding for
+faults of one code and one publisher's name; ``_SENTENCES`` has a function for each code.
 """
 
 from __future__ import annotations
@@ -43,34 +42,34 @@ RUNS_AT_MOST = 50
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One edge from a publisher that may not send it, or in a way that it may not."""
+    """An edge from a publisher that must not send it, or not in this way."""
 
     #: The finding's code.
     code: str
     #: The frame in which the pose was given, and the frame whose pose it was.
     parent: str
     child: str
-    #: The publisher's node; several where the rmw does not say which of them, none where the
-    #: publisher has no name.
+    #: The publisher's node; several candidates if the rmw does not identify senders; empty if it
+    #: has no name.
     nodes: tuple[str, ...]
-    #: Whether it came on /tf_static.
+    #: True: it came on /tf_static.
     static: bool
-    #: The planned edge of that child, None where it is undeclared.
+    #: The planned edge of that child; None: undeclared.
     edge: PlanEdge | None
-    #: Whether the publisher has the owner's name and is not the owner.
+    #: True: the publisher has the owner's name and is not the owner.
     namesake: bool = False
-    #: Whether it is one of several with the owner's name that take turns, each of which may be the
-    #: owner.
+    #: True: it is one of several alternating publishers with the owner's name, any of which may be
+    #: the owner.
     alternates: bool = False
     #: The frames of a loop that the edge closes.
     loop: tuple[str, ...] = ()
-    #: What was observed of stamps, or the name of the other publisher.
+    #: The observed stamps, or the name of the other publisher.
     detail: str = ""
-    #: Whether it is from a recording, in which publishers have no names.
+    #: True: it is from a recording, in which publishers have no names.
     recorded: bool = False
-    #: Whether the publisher belongs to no process that the plan starts, whatever its name is.
+    #: True: the publisher belongs to no process that the plan starts, despite its name.
     stranger: bool = False
-    #: How many processes do it.
+    #: Number of processes that do it.
     publishers: int = 1
 
     @property
@@ -84,7 +83,7 @@ class Fault:
 
     @property
     def whom(self) -> str:
-        """The publisher, as the object of an advice; one without a name was named just before."""
+        """The publisher, as the object of advice; one without a name was named just before."""
         if self.publishers > 1:
             return "all but one of them" if self.alternates else "them"
         is_nameless = not self.nodes and not self.recorded and not self.namesake
@@ -104,7 +103,7 @@ class Fault:
 
     @property
     def is_owners(self) -> bool:
-        """Whether the edge's owner did it."""
+        """Whether the edge's owner caused it."""
         return self.edge is not None and self.edge.node in self.nodes and not self.namesake
 
     @property
@@ -114,10 +113,10 @@ class Fault:
 
 
 def over_texts(ended: Sequence[tuple[Fault, bool]], robot: str = "") -> list[str]:
-    """Return the sentences that faults of one group are over.
+    """Return sentences that say faults of one group are over.
 
-    With each fault comes whether listeners keep what was latched; ``robot`` is the other robot
-    that did all of it.
+    Each fault comes with a flag: True if listeners keep the latched edge. ``robot`` is the other
+    robot that caused all of them.
     """
     by_edge = {fault.ends: fault for fault, _ in ended}
     kept = {fault.ends for fault, is_kept in ended if is_kept}
@@ -142,7 +141,7 @@ class FaultGroup:
 
     faults: Sequence[Fault]
     plan: Plan
-    #: Where each of the publishers runs, empty where that is unknown.
+    #: Where each publisher runs; empty: unknown.
     runs: Sequence[str] = ()
     #: The sensor that the publisher drives.
     driven: Driven | None = None
@@ -167,7 +166,7 @@ class FaultGroup:
 
     @property
     def are(self) -> str:
-        """The verb of the edges."""
+        """The verb for the edges: singular or plural."""
         return "are" if self.more else "is"
 
 
@@ -312,7 +311,7 @@ def taken_finding(group: FaultGroup) -> Finding:
 
 
 def other_robot_finding(faults: Sequence[Fault], run: OtherRun, plan: Plan) -> Finding:
-    """Return the finding for all that another robot publishes here."""
+    """Return the finding for all edges that another robot publishes here."""
     is_mild = all(
         fault.edge is None and fault.code in {UNDECLARED, TWO_PUBLISHERS} for fault in faults
     )
@@ -338,7 +337,7 @@ def other_robot_finding(faults: Sequence[Fault], run: OtherRun, plan: Plan) -> F
 
 
 def _leave_out_help(group: FaultGroup) -> str:
-    """Return the help for a publisher without the edge, or with a wrong parent."""
+    """Return the help for a publisher that should not send the edge, or has a wrong parent."""
     first, plan = group.first, group.plan
     if first.namesake:
         return f"stop {first.whom}: is the robot running twice? {tree.LAST_WINS}"
@@ -359,7 +358,7 @@ def _leave_out_help(group: FaultGroup) -> str:
 
 
 def _run_by(fault: Fault, plan: Plan) -> str:
-    """Return the process with programs of the robot's own that the publisher surely belongs to."""
+    """Return the robot's own process that the publisher certainly belongs to."""
     kinds = {"external"} if fault.stranger else {"run", "external", "component"}
     for process in plan.processes if len(fault.nodes) == 1 else ():
         if process.kind in kinds and fault.nodes[0] in process.nodes:
@@ -382,14 +381,14 @@ def _misnamed_help(group: FaultGroup) -> str:
 
 
 def sensor_of(fault: Fault, drives: Mapping[str, Sequence[Driven]]) -> Driven | None:
-    """Return the sensor that the publisher drives; of several the one whose name the frame has."""
+    """Return the sensor that the publisher drives; of several, the one named in the frame."""
     driven = drives.get(fault.nodes[0], ()) if len(fault.nodes) == 1 and not fault.namesake else ()
     named = [sensor for sensor in driven if sensor.sensor in fault.child]
     return next(iter(named or driven), None)
 
 
 def _is_driver_otherwise(group: FaultGroup) -> bool:
-    """Return whether a driver sends its own frames otherwise than its preset has them."""
+    """Return whether a driver sends its own frames differently from its preset."""
     first = group.first
     is_own = first.edge is None or first.edge.node in first.nodes
     is_publisher = group.driven is not None and bool(group.driven.publishes)
@@ -397,7 +396,7 @@ def _is_driver_otherwise(group: FaultGroup) -> bool:
 
 
 def _driver_message(group: FaultGroup) -> str:
-    """Return the message for frames that a driver sends otherwise than its preset has them."""
+    """Return the message for a driver's frames that differ from its preset."""
     if group.driven is None or not _is_driver_otherwise(group):
         return ""
     first = group.first
@@ -409,7 +408,7 @@ def _driver_message(group: FaultGroup) -> str:
 
 
 def _driver_help(group: FaultGroup) -> str:
-    """Return the help about a sensor's driver, or an empty text."""
+    """Return the help about a sensor's driver; empty if there is none."""
     first, driven = group.first, group.driven
     if driven is None or first.code not in {*_OTHERWISE, NOT_OWNER}:
         return ""
@@ -463,7 +462,7 @@ def _declared_notes(fault: Fault) -> list[Note]:
 
 
 def _run_notes(group: FaultGroup) -> list[Note]:
-    """Return a note for each publisher with where it runs."""
+    """Return a note for each publisher, saying where it runs."""
     first = group.first
     who = replace(first, publishers=1, namesake=first.namesake and not first.alternates).who
     runs = [] if len(first.nodes) > 1 else filter(None, group.runs)

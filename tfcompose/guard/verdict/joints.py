@@ -1,7 +1,7 @@
 """Joint states: their subscribers, publishers and joints.
 
-A moving joint needs its state from one publisher: a listener takes whatever comes, so the frames
-jump between the positions of two.
+A moving joint needs states from exactly one publisher. A listener takes every message, so with two
+publishers the frames jump between their positions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NAMED_AT_MOST = 8
 
 
 def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
-    """Joint states come, and no node turns them into transforms."""
+    """Joint states arrive, and no node turns them into transforms."""
     missing = _missing(state)
     for topic in _joint_topics(state):
         if (
@@ -84,7 +84,7 @@ def _sender_help(state: TreeState) -> str:
 
 
 def joint_without_state(state: TreeState) -> Iterator[Finding]:
-    """Joint states come, and a joint of the description is not in them."""
+    """Joint states arrive without a joint of the description."""
     sent = state.joint_names
     if not sent:
         return
@@ -124,11 +124,9 @@ def _moving_joints(state: TreeState) -> Sequence[MovingJoint]:
 
 
 def _joint_topics(state: TreeState) -> list[TopicState]:
-    """Return the topics of joint states that are meant.
+    """Return the topics named ``joint_states``, without those of other robots.
 
-    Those named ``joint_states``, but for robots beside this one.
-
-    A robot beside has TF topics of its own, in a namespace below this one's.
+    Another robot has its own TF topics, in a namespace below this robot's.
     """
     own = _namespace(state.topics[0])
     spaces = {
@@ -162,7 +160,7 @@ def _transformers(state: TreeState, topic: TopicState) -> list[str]:
 
 
 def joint_senders(state: TreeState) -> Iterator[Finding]:
-    """A joint has the states of two publishers, or the robot has no such joint."""
+    """Two publishers send states of a joint, or the robot has no such joint."""
     heard = {topic.name for topic in _joint_topics(state)}
     senders = [sender for sender in state.sent_joints if sender.topic in heard]
     yield from find_sent_twice(senders)
@@ -170,18 +168,18 @@ def joint_senders(state: TreeState) -> Iterator[Finding]:
 
 
 def known_joints(state: TreeState) -> frozenset[str]:
-    """Return the names of the robot's joints, by its description and its plan."""
+    """Return the names of the robot's joints, from its description and its plan."""
     described = {joint.name for joint in state.moving_joints}
     return frozenset(described | (planned_joints(state.plan) if state.plan else frozenset()))
 
 
 def planned_joints(plan: Plan) -> frozenset[str]:
-    """Return the names of the joints that the plan's edges have."""
+    """Return the names of the joints in the plan's edges."""
     return frozenset(edge.joint.name for edge in plan.edges if edge.joint is not None)
 
 
 def find_sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
-    """Find joints of which several publishers of a topic send states at the same time."""
+    """Find joints whose states several publishers of a topic send at the same time."""
     shared: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for topic in dict.fromkeys(sender.topic for sender in senders):
         of_topic = [sender for sender in senders if sender.topic == topic and sender.node]

@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: bool) -> str:
-    """Return the code of the fault of a planned edge received with ``parent``, or an empty text.
+    """Return the code for a planned edge received with ``parent``; empty: no fault.
 
-    ``static`` says that it came on /tf_static, ``owner`` that its owner may have sent it, ``sure``
-    that no other node can have.
+    ``static``: it came on /tf_static. ``owner``: its owner may have sent it. ``sure``: no other
+    node can have.
     """
     if not edge.may_hang_on(parent):
         return "TF802"

@@ -37,7 +37,7 @@ TOGETHER_S = 0.3
 
 
 def two_publishers_message(edges: str, publishers: Sequence[str], *, are_many: bool) -> str:
-    """Return the message for edges that have two publishers; one name alone is there twice."""
+    """Return the message for edges with two publishers; a single name has two instances."""
     names = list(dict.fromkeys(publishers))
     by = f"twice by {names[0]}" if len(names) == 1 else f"by {' and by '.join(names)}"
     return f"{edges} {'are' if are_many else 'is'} published {by}"
@@ -46,11 +46,10 @@ def two_publishers_message(edges: str, publishers: Sequence[str], *, are_many: b
 def topics_message(
     edges: str, topics: Sequence[tuple[str, str]], declared: str = "", *, are_many: bool = False
 ) -> str:
-    """Return the message for edges that come on the wrong topic, or on two.
+    """Return the message for edges on the wrong topic, or on both.
 
-    The topics, each with who publishes there.
-
-    ``declared`` is the topic that the plan says, empty where none does.
+    ``topics`` has each topic with its publisher. ``declared`` is the plan's topic; empty: the plan
+    has none.
     """
     on = " and ".join(f"on {' by '.join(filter(None, pair))}" for pair in topics)
     return (
@@ -62,8 +61,7 @@ def topics_message(
 def flood(node: str, where: str, transforms: int, hertz: float | None) -> Finding:
     """Return the finding for a publisher of more undeclared edges than the guard judges.
 
-    Its messages have up to so many transforms and come so often; ``hertz`` is None where that is
-    not known.
+    Its messages have up to ``transforms`` transforms. ``hertz`` is their rate; None: unknown.
     """
     rate = f" at {hertz:.3g} Hz" if hertz else ""
     message = (
@@ -81,7 +79,7 @@ def flood(node: str, where: str, transforms: int, hertz: float | None) -> Findin
 
 
 def find_floods(state: TreeState) -> Iterator[Finding]:
-    """A node publishes more edges than are kept."""
+    """A node publishes more edges than the observer keeps."""
     named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.beyond.items():
         sender = named.get(gid) if gid is not None else None
@@ -103,9 +101,9 @@ def find_floods(state: TreeState) -> Iterator[Finding]:
 def unfenced_finding(
     node: str, process: str, topic: str, profile: str, *, remapped: bool
 ) -> Finding:
-    """Return the finding for a process of a strict plan outside its isolation.
+    """Return the finding for a process of a strict plan that bypasses the filter.
 
-    ``profile`` is the profile file that it was started with instead of the fence's; empty: none.
+    ``profile`` is the profile file that it started with instead of the plan's; empty: none.
     """
     message = (
         f"{node} of {process} publishes {topic} without passing the strict guard: every"
@@ -140,7 +138,7 @@ def unfenced_finding(
 def unmarked_finding(node: str, topic: str, where: str, *, remapped: bool) -> Finding:
     """Return the finding for a process of a strict plan's run whose environment was cleared.
 
-    It runs ``where``, and is not behind the fence, which may be of remappings.
+    It runs ``where``, and bypasses the filter. ``remapped``: remappings isolate the others.
     """
     message = (
         f"{node} publishes {topic} without passing the strict guard: every listener receives it"
@@ -156,7 +154,7 @@ def unmarked_finding(node: str, topic: str, where: str, *, remapped: bool) -> Fi
 
 
 def best_effort_publisher(node: str, topic: str) -> Finding:
-    """Return the finding for a publisher that sends best effort, which no TF listener accepts."""
+    """Return the finding for a best-effort publisher, which no TF listener accepts."""
     message = (
         f"{node} publishes {topic} best effort, so no listener receives it: all ask for reliable"
     )
@@ -238,7 +236,7 @@ def two_publishers(state: TreeState) -> Iterator[Finding]:
 
 
 def both_topics(state: TreeState) -> Iterator[Finding]:
-    """A frame comes on /tf and on /tf_static."""
+    """A frame arrives on /tf and on /tf_static."""
     kinds: dict[str, dict[bool, EdgeState]] = {}
     for edge in state.taken:
         kinds.setdefault(edge.child, {})[edge.stream.static] = edge
@@ -255,7 +253,7 @@ def both_topics(state: TreeState) -> Iterator[Finding]:
 
 
 def volatile_static(state: TreeState) -> Iterator[Finding]:
-    """Fixed frames are sent so that no listener can receive them."""
+    """Fixed frames are published so that no listener can receive them."""
     for publisher in state.publishers:
         if (
             publisher.static
@@ -288,7 +286,7 @@ def volatile_reader(state: TreeState) -> Iterator[Finding]:
 
 
 def best_effort(state: TreeState) -> Iterator[Finding]:
-    """Frames are sent best effort, and listeners ask for reliable."""
+    """Frames are sent best effort, but listeners require reliable."""
     for publisher in state.publishers:
         if not publisher.reliable and publisher.node and publisher.type in {"", TF_MESSAGE}:
             yield best_effort_publisher(
@@ -297,7 +295,7 @@ def best_effort(state: TreeState) -> Iterator[Finding]:
 
 
 def other_type(state: TreeState) -> Iterator[Finding]:
-    """Something else than transforms is published on a topic of TF."""
+    """Messages of another type are published on a topic of TF."""
     for topic in state.graph:
         if topic.name in state.topics and topic.type != TF_MESSAGE and topic.publishers:
             message = (
@@ -314,7 +312,7 @@ def other_type(state: TreeState) -> Iterator[Finding]:
 
 
 def unreadable(state: TreeState) -> Iterator[Finding]:
-    """Bytes come that are no TFMessage."""
+    """Messages arrive that cannot be decoded as TFMessage."""
     named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.malformed.items():
         sender = named.get(gid) if gid is not None else None
@@ -335,7 +333,7 @@ def unreadable(state: TreeState) -> Iterator[Finding]:
 
 
 def many_static(state: TreeState) -> Iterator[Finding]:
-    """So many nodes publish fixed frames that listeners lose some."""
+    """Too many nodes publish fixed frames: listeners lose some."""
     fixed = [publisher for publisher in state.publishers if publisher.static]
     if len(fixed) >= MOST_STATIC:
         nodes = sorted({publisher.node for publisher in fixed if publisher.node})
@@ -370,10 +368,7 @@ def isolation_leak(state: TreeState) -> Iterator[Finding]:
 
 
 def _together(edges: Sequence[EdgeState]) -> bool:
-    """Whether two of them sent in the same stretch of time.
-
-    What is fixed is sent once and holds on.
-    """
+    """Return whether two of them sent in overlapping periods; fixed edges stay valid."""
     spans = []
     for edge in edges:
         stream = edge.stream
@@ -383,7 +378,7 @@ def _together(edges: Sequence[EdgeState]) -> bool:
 
 
 def _difference(edges: Sequence[EdgeState]) -> str:
-    """Return how far apart the newest poses are."""
+    """Return the distance between the newest poses."""
     off = offset_of(edges[0].stream.pose, edges[1].stream.pose)
     return (
         f"their newest values are {off.text} apart"
@@ -414,12 +409,10 @@ def compare(expected: Pose, observed: Pose) -> str:
 def pose_differs(
     off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, span: Span | None = None
 ) -> Finding:
-    """Return the finding for edges that come with another pose than the plan's.
+    """Return the finding for edges whose pose differs from the plan's.
 
-    Each with its parent, as it was sent.
-
-    ``publisher`` is empty where it is not known; ``span`` is where the first edge is in the
-    robot's file.
+    ``off`` has each edge with the parent and the pose as sent. ``publisher`` is empty if unknown;
+    ``span`` is the first edge's place in the robot file.
     """
     (edge, parent, pose), *others = off
     by = f" from {publisher}" if publisher else ""

@@ -66,9 +66,9 @@ def silent(
     over: bool = False,
     gone: bool = False,
 ) -> Finding:
-    """Return the finding for edges of one owner that were not received for ``seconds``.
+    """Return the finding for edges of one owner that were not received for ``silence_s`` seconds.
 
-    ``over`` says that they came again after that, ``gone`` that the owner's publisher has left.
+    ``over``: they came again after that. ``gone``: the owner's publisher has left.
     """
     first = edges[0]
     names = [edge.name for edge in edges]
@@ -95,7 +95,7 @@ def slow(
     span: Span | None = None,
     severity: Severity = "warning",
 ) -> Finding:
-    """Return the finding for edges of one owner that come with ``rate`` hertz."""
+    """Return the finding for edges of one owner that arrive at ``rate`` hertz."""
     first = edges[0]
     come = "comes" if len(edges) == 1 else "come"
     named = list_names([edge.name for edge in edges])
@@ -162,7 +162,7 @@ def _declared_notes(edges: Sequence[PlanEdge]) -> list[Note]:
 
 
 def low_rate(state: TreeState) -> Iterator[Finding]:
-    """An edge comes so seldom that lookups fail between two messages, and frames jump."""
+    """An edge arrives so rarely that lookups fail between two messages, and frames jump."""
     inside, rated = {edge.parent for edge in state.taken}, state.rated
     for edge in state.moving:
         rate, least = edge.timing.rate, least_of(edge, inside) * _speed(state, edge)
@@ -212,7 +212,7 @@ def gap(state: TreeState) -> Iterator[Finding]:
 
 
 def fell_silent(state: TreeState) -> Iterator[Finding]:
-    """An edge came, and does not come any more."""
+    """An edge arrived, and stopped."""
     alive = {(edge.parent, edge.child) for edge in state.moving if not is_silent(edge)}
     elsewhere = {edge.child for edge in state.moving if not is_silent(edge)}
     rated = state.rated
@@ -226,7 +226,7 @@ def fell_silent(state: TreeState) -> Iterator[Finding]:
 
 
 def find_fixed_left(state: TreeState) -> Iterator[Finding]:
-    """Fixed edges were there, but the publisher that latched them has left."""
+    """Fixed edges arrived, but the publisher that latched them has left."""
     held = {edge.child for edge in state.taken if edge.stream.static and edge.present is not False}
     held |= state.planned
     lost: dict[str, list[EdgeState]] = {}
@@ -239,10 +239,7 @@ def find_fixed_left(state: TreeState) -> Iterator[Finding]:
 
 
 def _speed(state: TreeState, edge: EdgeState) -> float:
-    """Return how fast simulated time goes by, 1 at most.
-
-    So much less often may come what it rules.
-    """
+    """Return the real-time factor of a simulated edge, at most 1: expected rates shrink by it."""
     clock_ns = state.clock_ns
     ruled = clock_ns is not None and abs(edge.stream.stamp_ns - clock_ns) <= KEPT_NS
     return min(1.0, edge.stream.speed) if ruled else 1.0
@@ -256,7 +253,7 @@ def least_of(edge: EdgeState, inside: set[str]) -> float:
 
 
 def is_silent(edge: EdgeState) -> bool:
-    """Whether a moving edge has stopped after a steady rate."""
+    """Return whether a moving edge has stopped after a steady rate."""
     count = edge.stream.arrivals.count
     span_s = (edge.stream.arrivals.last_ns - edge.stream.first_ns) / 1e9
     period_s = span_s / (count - 1) if count >= FEWEST else float("inf")

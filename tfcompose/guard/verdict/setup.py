@@ -1,4 +1,4 @@
-"""The ROS setup: whether there is anything to listen to, and whether this process can hear it."""
+"""The ROS setup: whether TF is published, and whether this process can receive it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
 
 
 def other_settings(state: TreeState) -> Iterator[Finding]:
-    """Missing frames: local processes that cannot be heard because ROS is set up otherwise."""
+    """Missing frames: local processes that cannot be heard because their ROS setup differs."""
     complete = not state.planned - {edge.child for edge in state.edges}
     if (state.edges and complete) or (not state.edges and _elsewhere(state)):
         return

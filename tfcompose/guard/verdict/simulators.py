@@ -21,7 +21,7 @@ _TREES = {
 
 
 def switch_of_simulator(nodes: Iterable[str]) -> str:
-    """Return whose tree one of these nodes publishes and its switch, empty for other nodes."""
+    """Return the simulator that one of these nodes belongs to, and its switch; empty: none."""
     for node in nodes:
         for pattern, tree in _TREES.items():
             if fnmatchcase(node.rpartition("/")[2], pattern):

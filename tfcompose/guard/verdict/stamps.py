@@ -1,8 +1,8 @@
-"""Stamps and clocks: the wrong clock, the same stamp again, back in time, too old and too new.
+"""Stamps and clocks: wrong clock, repeated stamps, back in time, too old, too new.
 
 The guard judges stamps message by message, with ``StampHistory`` and ``Clocks``; the doctor judges
-at the end what an observer has counted. A stamp is compared with the system's time, or with
-simulated time as it comes on /clock.
+an observer's counts at the end. A stamp is compared with system time, or with simulated time from
+/clock.
 """
 
 from __future__ import annotations
@@ -61,11 +61,10 @@ STANDS_S = 0.3
 
 
 def other_clock(stamp_ns: int, received_ns: int, sim_ns: int | None, *, simulated: bool) -> str:
-    """Return how a stamp is of another clock than expected, empty if it is not.
+    """Return how a stamp's clock differs from the expected one; empty: it does not.
 
-    ``received_ns`` is the system's time when it came, 0 where that is not known; ``sim_ns`` the
-    newest time on /clock, None where there is none. ``simulated`` says which of the two it should
-    be.
+    ``received_ns`` is the system time of the arrival, 0 if unknown; ``sim_ns`` the newest time on
+    /clock, None if there is none. ``simulated`` selects the expected one.
     """
     if stamp_ns == 0:
         return "without a stamp"
@@ -106,9 +105,9 @@ _MOST_HOURS = 14
 
 
 def offset_name(ahead_s: float) -> str:
-    """Return what a clock has that is so far ahead of UTC, in seconds; empty where that is open.
+    """Return the name of the time scale that is ``ahead_s`` seconds ahead of UTC; empty: unknown.
 
-    It goes on a sentence: " (TAI, which PTP has)".
+    It continues a sentence: " (TAI, which PTP has)".
     """
     for offset_s, name in _SCALES.items():
         if abs(ahead_s - offset_s) <= _NEAR_S:
@@ -119,7 +118,7 @@ def offset_name(ahead_s: float) -> str:
 
 
 def _is_since_boot(stamp_ns: int, received_ns: int) -> bool:
-    """Whether a stamp equals the uptime of this machine; never for a recording."""
+    """Return whether a stamp equals the uptime of this machine; never for a recording."""
     uptime_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
     then_ns = received_ns - (time.time_ns() - uptime_ns)
     return 0 < then_ns <= uptime_ns and abs(stamp_ns - then_ns) <= KEPT_NS
@@ -160,20 +159,19 @@ def advice(code: str, detail: str) -> str:
 
 @dataclass(slots=True)
 class Clocks:
-    """The time: the system's when a message came, and the newest /clock (None: none yet).
-
-    ``sent`` says whether anybody is there who could send it.
-    """
+    """The clocks of stamps: system time at the arrival of a message, and /clock."""
 
     simulated: bool
+    #: The newest time on /clock; None: none yet.
     sim_ns: int | None = None
+    #: Whether a node publishes /clock.
     sent: bool = True
     _moved: float = 0.0
     _since: tuple[float, int] | None = None
     _speed: float = 1.0
 
     def take(self, sim_ns: int | None, now: float) -> None:
-        """Take the newest time on /clock, and when that was."""
+        """Take the newest time on /clock, and its arrival."""
         self._moved = self._moved if sim_ns == self.sim_ns else now
         self.sim_ns = sim_ns
         if sim_ns is None:
@@ -185,9 +183,9 @@ class Clocks:
             self._since = (now, sim_ns)
 
     def stands(self, now: float) -> bool:
-        """Return whether time came and has stopped.
+        """Return whether simulated time came and has stopped.
 
-        No node sends anything then, and none counts as silent.
+        No node sends during that time, so none counts as silent.
         """
         return (
             self.simulated
@@ -197,20 +195,20 @@ class Clocks:
         )
 
     def speed(self, now: float) -> float:
-        """Return how many seconds go by on /clock in a second, 1 at most.
+        """Return the real-time factor of /clock, at most 1.
 
-        The least of what is, and was a while ago.
+        The minimum of the current factor and the one a while ago.
         """
         enough = self._since is not None and now - self._since[0] >= SPEED_OVER_S / 4
         return min(self._speed, self._measure_speed(now)) if enough else self._speed
 
     def _measure_speed(self, now: float) -> float:
-        """Return the speed since the last time that it was measured."""
+        """Return the real-time factor since the last measurement."""
         begun, begun_ns = self._since or (now, 0)
         return min(1.0, ((self.sim_ns or 0) - begun_ns) / _SECOND_NS / max(now - begun, 1e-9))
 
     def reference_ns(self, received_ns: int) -> int | None:
-        """Return the time that stamps should have, or None if that is not known."""
+        """Return the time that stamps should have, or None if unknown."""
         return self.sim_ns if self.simulated else received_ns or None
 
 
@@ -224,9 +222,9 @@ class StampHistory:
     wrong: int = 0
 
     def judge(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> tuple[str, str]:
-        """Take a message's stamps and return the fault's code and what was observed.
+        """Take a message's stamps; return the fault's code and the observation.
 
-        Empty where all is well.
+        Both are empty if the stamps are correct.
         """
         last, self.last = self.last, stamps_ns
         off = self._clock(stamps_ns, received_ns, clocks)
@@ -272,7 +270,7 @@ class StampHistory:
 
 
 def find_repeated_stamps(state: TreeState) -> Iterator[Finding]:
-    """A publisher sends an edge with the same stamp again and again."""
+    """A publisher repeats an edge with the same stamp."""
 
     def repeats(edge: EdgeState) -> bool:
         return (
@@ -297,9 +295,9 @@ def stamp_went_back(state: TreeState) -> Iterator[Finding]:
 
 
 def wrong_clock(state: TreeState) -> Iterator[Finding]:
-    """Stamps are of another clock than the others'.
+    """Stamps come from another clock than the others.
 
-    Simulated and system time mixed, or no stamp at all.
+    Simulated and system time are mixed, or stamps are missing.
     """
     simulated = state.simulated
     for edges in by_publisher(
@@ -321,7 +319,7 @@ def _stamp_finding(
 
 
 def host_clock_off(state: TreeState) -> Iterator[Finding]:
-    """The clock of another machine is not this one's."""
+    """The clock of another machine differs from this one's."""
     machines: dict[tuple[bool, str], tuple[float, list[str]]] = {}
     for publisher in state.publishers:
         skew = state.skews_s.get(publisher.gid)
@@ -369,7 +367,7 @@ def stamps_ahead(state: TreeState) -> Iterator[Finding]:
 
 
 def clock_missing(state: TreeState) -> Iterator[Finding]:
-    """Nodes wait for simulated time, and it does not come."""
+    """Nodes wait for simulated time, and none arrives."""
     for topic in state.graph:
         if topic.name != "/clock" or not (
             topic.readers or (state.plan and state.plan.ros.clock == "sim")
@@ -413,7 +411,7 @@ def two_clocks(state: TreeState) -> Iterator[Finding]:
 def by_publisher(
     state: TreeState, is_so: Callable[[EdgeState], bool]
 ) -> Iterator[list[EdgeState]]:
-    """Give the moving edges of which something is so, those of one publisher together."""
+    """Yield the moving edges for which ``is_so`` holds, those of one publisher together."""
     found: dict[object, list[EdgeState]] = {}
     for edge in state.moving:
         if is_so(edge):
@@ -422,7 +420,7 @@ def by_publisher(
 
 
 def names_of(edges: Sequence[EdgeState]) -> str:
-    """Return the first edge by name, and how many more there are."""
+    """Return the first edge's name, and how many more there are."""
     return with_more(edges[0].name, len(edges) - 1)
 
 
@@ -435,7 +433,7 @@ def _repeats(edge: EdgeState) -> bool:
 
 
 def _stands_with_the_clock(state: TreeState, edge: EdgeState) -> bool:
-    """Whether its stamps are those of a /clock that does not move (another finding)."""
+    """Return whether its stamps repeat a /clock that does not advance (another finding)."""
     return (
         state.clock_ns is not None
         and not state.clock_moves
@@ -454,13 +452,13 @@ def _behind_newest_s(edge: EdgeState) -> float:
 
 
 def least_delay_s(edge: EdgeState) -> float:
-    """Return the least age of a stamp when it came; a repeated stamp only grows old."""
+    """Return the minimum age of a stamp at its arrival; a repeated stamp only grows older."""
     least = edge.timing.least_delay_s
     return 0.0 if least is None or _repeats(edge) else least
 
 
 def _off_clock(state: TreeState, edge: EdgeState, *, simulated: bool) -> str:
-    """Return how the stamps are not of the clock that the others have, or nothing."""
+    """Return how the stamps differ from the clock of the others; empty: they do not."""
     stream = edge.stream
     if stream.stamp_ns and _many(edge, stream.stamps_repeated):
         return ""  # it is off at last, which follows

@@ -34,7 +34,7 @@ _NORMALISE = (
 
 
 def way(frames: Sequence[str]) -> str:
-    """Return frames as a way down the tree."""
+    """Return frames as a path down the tree."""
     return " → ".join(frames)
 
 
@@ -88,13 +88,13 @@ def self_transform(state: TreeState) -> Iterator[Finding]:
 
 
 def drops(state: TreeState) -> Iterator[Finding]:
-    """Transforms come that no listener takes: a quaternion that is none, a NaN, an empty name."""
+    """Transforms arrive that every listener drops: no unit quaternion, NaN, an empty name."""
     for edge in state.edges:
         yield from rejected_transforms(edge)
 
 
 def rejected_transforms(edge: EdgeState) -> Iterator[Finding]:
-    """Give the finding for an edge of which tf2 drops transforms, unless it is a self-loop."""
+    """Yield the finding for an edge whose transforms tf2 drops, unless it is a self-loop."""
     stream = edge.stream
     if stream.rejected is None or edge.parent == edge.child:
         return
@@ -113,7 +113,7 @@ def rejected_transforms(edge: EdgeState) -> Iterator[Finding]:
 
 
 def slash_in_front(state: TreeState) -> Iterator[Finding]:
-    """Names come with a slash in front, which tf2 drops, and does not take in lookups."""
+    """Names begin with a slash, which tf2 strips from messages but rejects in lookups."""
     found: dict[str, list[EdgeState]] = {}
     for edge in state.taken:
         if edge.stream.slashed:
@@ -131,7 +131,7 @@ def slash_in_front(state: TreeState) -> Iterator[Finding]:
 
 
 def loop(state: TreeState) -> Iterator[Finding]:
-    """Frames are each other's ancestors, so that tf2 finds no way through them."""
+    """Frames are each other's ancestors, so that tf2 finds no path through them."""
     for frames in loops(_pairs(state)):
         on_it = [edge for edge in state.taken if _is_on(edge, frames)]
         message = loop_message((*frames, frames[0]))
@@ -151,7 +151,7 @@ def loop(state: TreeState) -> Iterator[Finding]:
 
 
 def second_parent(state: TreeState) -> Iterator[Finding]:
-    """A frame hangs on two parents; tf2 takes whichever came last."""
+    """A frame has two parents; tf2 uses the one received last."""
     above, planned = _above(state), state.planned
     in_loops = {frame for frames in loops(_pairs(state)) for frame in frames}
     for child, edges in above.items():
@@ -171,7 +171,7 @@ def second_parent(state: TreeState) -> Iterator[Finding]:
 
 
 def two_trees(state: TreeState) -> Iterator[Finding]:
-    """Frames are in trees that nothing connects."""
+    """Frames are in unconnected trees."""
     found = trees_of(state)
     expected = (
         {edge.parent for edge in state.plan.edges} - state.planned if state.plan else frozenset()
@@ -241,7 +241,7 @@ def _describe_edge(state: TreeState, edge: EdgeState) -> str:
 
 
 def _hands_over(edges: list[EdgeState]) -> bool:
-    """Whether all are of one publisher that alternates between parents."""
+    """Return whether all come from one publisher that alternates between parents."""
     handover = edges[0].stream.handover
     return handover is not None and handover.is_one and len(handover.streams) == len(edges)
 

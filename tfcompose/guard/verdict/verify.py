@@ -1,9 +1,9 @@
 """Compares a plan with a running tree or a recording, edge by edge.
 
-What is fixed is compared by value: what tfcompose publishes itself, what another owner sends on
-/tf_static with a pose that the robot says, and of a joint what its motion leaves as it is. Frames
-inside a sensor that its driver publishes may be calibrated: they are compared as far as the preset
-says how well it knows them.
+Fixed poses are compared by value: those that tfcompose publishes, those that another owner sends
+on /tf_static if the robot file gives a pose, and the fixed part of a joint's pose. Frames inside a
+sensor that its driver publishes may be calibrated. They are compared as precisely as the preset
+claims to know them.
 
 ``verify`` has a verdict for each edge; the doctor reports differences of one kind and one
 publisher together.
@@ -66,21 +66,21 @@ _TURNING = frozenset({"revolute", "continuous"})
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One thing that is wrong with one edge.
-
-    ``edge`` is the planned one, None where nobody declared it, ``live`` what came, None where
-    nothing did. What else there is depends on the code: a ``fault``; a ``driver``'s frame
-    that is elsewhere; how far a pose is ``off``, whoever sent it; the ``silence_s`` in which
-    nothing came, which are ``over`` or not.
-    """
+    """One deviation of one edge; its code determines which of the later fields are set."""
 
     code: str
+    #: The planned edge; None: undeclared.
     edge: PlanEdge | None
+    #: The observed edge; None: not received.
     live: EdgeState | None = None
     fault: Fault | None = None
+    #: The preset's frame whose pose the driver sends differently.
     driver: Expected | None = None
+    #: Deviation of the pose, whoever sent it.
     off: Offset | None = None
+    #: Time without a message, in seconds.
     silence_s: float = 0.0
+    #: True: the silence has ended.
     over: bool = False
 
 
@@ -246,9 +246,9 @@ class _Comparison:
 
 
 def _times(edge: PlanEdge, observed: EdgeState, *, simulated: bool) -> Iterator[Difference]:
-    """Judge whether it comes, and often enough.
+    """Judge whether it arrives, and often enough.
 
-    A simulation may go slower than the time of day.
+    A simulation may run slower than real time.
     """
     rate, limit_s = edge.rate, edge.silent_after_s
     if observed.present is False:
@@ -296,7 +296,7 @@ def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
 
 
 def group_differences(found: Iterable[Difference]) -> list[list[Difference]]:
-    """Return those that are reported together, in the order in which the first of each came."""
+    """Return groups of differences to report together, ordered by the first of each."""
     groups: dict[tuple[object, ...], list[Difference]] = {}
     for finding in found:
         groups.setdefault(_key(finding), []).append(finding)
@@ -312,7 +312,7 @@ def group_finding(
 ) -> Finding:
     """Return the finding for differences of one group.
 
-    ``span`` is where the first edge is in the robot's file.
+    ``span`` is the first edge's place in the robot file.
     """
     first = group[0]
     finding = (
@@ -403,7 +403,7 @@ def _fault_finding(group: Group, state: TreeState, plan: Plan, span: Span | None
 
 
 def _elsewhere(group: Group) -> list[Note]:
-    """Return how far the poses are off that came from a node other than the owner."""
+    """Return the deviations of poses from nodes other than the owner."""
     off = [
         (difference.fault, difference.off)
         for difference in group
@@ -446,12 +446,10 @@ def differs_from_plan(state: TreeState) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Result for an edge; without findings if it is as expected.
-
-    ``owner`` is None where nobody declared it, and empty for what is wrong with the whole tree.
-    """
+    """Result for an edge; no findings if it is as expected."""
 
     edge: str
+    #: None: undeclared; empty: the finding concerns the whole tree.
     owner: str | None
     findings: tuple[Finding, ...]
 
@@ -464,7 +462,7 @@ def verify(
 ) -> list[Verdict]:
     """Return a verdict for each planned edge, in order, then for each unplanned one.
 
-    ``places`` is where the edges stand in the robot's file, by child.
+    ``places`` has the edges' places in the robot file, by child.
     """
     found: dict[str, list[Finding]] = {edge.child: [] for edge in plan.edges}
     extra = []
@@ -509,9 +507,9 @@ _AHEAD_S = 1.0
 
 
 def _wrong_times(edge: EdgeState, state: TreeState, plan: Plan) -> Iterator[Finding]:
-    """Find stamps with which no lookup at the current time gets an edge's pose.
+    """Find stamps that make lookups at the current time fail for an edge.
 
-    As the doctor has them; whether simulated time goes is not known here.
+    These are the doctor's checks; whether simulated time advances is unknown here.
     """
     if plan.ros.clock == "sim":
         return
@@ -539,7 +537,7 @@ def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
 
 
 def summary(verdicts: Sequence[Verdict]) -> str:
-    """Return one line: how many edges are as expected, and how many are not declared."""
+    """Return one line: how many edges are as expected, and how many are undeclared."""
     planned = [verdict for verdict in verdicts if verdict.owner]
     right = sum(not verdict.findings for verdict in planned)
     extra = sum(verdict.owner is None for verdict in verdicts)

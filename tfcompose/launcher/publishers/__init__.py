@@ -1,6 +1,4 @@
-"""tfcompose's own publishers.
-
-Static edges, moving joints, simulations, and the robot's description.
+"""tfcompose's own publishers: static edges, moving joints, simulations, robot description.
 
 Each is a process of the plan: ``tfcompose static PLAN_FILE PROCESS_NAME``, ``joints``,
 ``simulate``.

@@ -1,4 +1,4 @@
-"""The robot's description: latched, and compared with what others publish under the same name."""
+"""The robot description: latched, and compared with descriptions from other nodes."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _NAMED_WITHIN_S = 3.0
 
 
 class DescriptionPublisher:
-    """The plan's description, published for everybody who joins while this object lives.
+    """The plan's description, published for all subscribers while this object lives.
 
     The plan says what moves and who publishes it, so another description on the topic changes
-    nothing here. But who reads the topic takes the newest, so that it is said.
+    nothing here. But subscribers of the topic take the newest one, so the process warns about it.
     """
 
     def __init__(self, own: Own, node: Node) -> None:
@@ -48,12 +48,12 @@ class DescriptionPublisher:
     def is_waiting(self) -> bool:
         """Whether ``check`` should be called again soon.
 
-        A publisher is known before its node's name is.
+        A publisher is discovered before its node's name is.
         """
         return bool(self._unnamed)
 
     def check(self) -> None:
-        """Take what has come, and say once of each publisher that it has another description."""
+        """Read new messages, and warn once about each publisher of another description."""
         for received, text in self.subscription.take_texts():
             if (
                 text != self._text

@@ -1,11 +1,11 @@
-"""From joint states to TF messages, bytes to bytes.
+"""Conversion of joint states to TF messages, bytes to bytes.
 
-Unusable joint states are reported and left out.
+Unusable joint states are reported and dropped.
 
 The pose of a joint's edge is its pose at 0 followed by the motion (URDF). For a turn about the
 unit axis a that is p₀, q₀·(a sin q/2, cos q/2) = cos q/2 · q₀ + sin q/2 · q₀·(a, 0); for a slide
-p₀ + q · R₀a, q₀. Both are linear in what the position gives, so that no joint is computed by
-itself.
+p₀ + q · R₀a, q₀. Both are linear in functions of the position, so that all joints are computed at
+once.
 """
 
 from __future__ import annotations
@@ -39,21 +39,16 @@ _MOST_LINES = 64
 
 @dataclass(frozen=True, slots=True)
 class PublishOptions:
-    """How joint states are published; the words are robot_state_publisher's.
+    """Publishing options of joint states, with the names that robot_state_publisher uses."""
 
-    ``publish_frequency`` in Hz is the most of those with the same names, or 0 for all.
-    ``ignore_timestamp`` says that they are published whatever their time is: also when it is the
-    last one's, or their frequency too high.
-    """
-
+    #: In Hz, the highest rate for joint states with the same names; 0: no limit.
     publish_frequency: float = 0.0
+    #: True: publish whatever the stamp, even a repeated one or one above the highest rate.
     ignore_timestamp: bool = False
 
 
 def positions_of(names: JointNames, data: bytes) -> NDArray[np.float64]:
-    """Return the positions of a message that has these names, in their order.
-
-    Rad or m, shape (names,).
+    """Return the positions of a message with these names: rad or m, shape (names,).
 
     Raises:
         ValueError: if it has another number of positions.
@@ -75,9 +70,9 @@ class _Source:
 class JointMover:
     """The moving edges of a plan.
 
-    ``say`` is given lines for people. ``now_ns`` gives the time for a message without a stamp,
-    from its arrival in nanoseconds, or None as long as there is none: messages that are sent by
-    hand often have no stamp.
+    ``say`` receives lines for the user. ``now_ns`` returns the time for a message without a stamp,
+    given its arrival in nanoseconds, or None while there is none: messages sent by hand often have
+    no stamp.
     """
 
     def __init__(
@@ -114,7 +109,7 @@ class JointMover:
 
     @property
     def missing(self) -> list[str]:
-        """The joints that no joint state has moved yet; not those that follow one of them."""
+        """The joints that no joint state has moved yet, without those that mimic them."""
         names = {
             joint.name for index, joint in enumerate(self._all_joints) if index not in self._moved
         }
@@ -125,7 +120,7 @@ class JointMover:
         ]
 
     def tf_message(self, data: bytes, received_ns: int) -> bytes | None:
-        """Return a joint state as a TFMessage, or None if it says nothing."""
+        """Return a joint state as a TFMessage, or None if it moves nothing."""
         try:
             source = self._source(data)
             if source.moving is None:
@@ -162,11 +157,11 @@ class JointMover:
         return self._sources[-1]
 
     def _is_due(self, source: _Source, stamp_ns: int) -> bool:
-        """Whether a joint state of this time is published, and note that it is.
+        """Return whether a joint state with this stamp is published, and record that it is.
 
-        tf2 takes the first transform of one time only, and every listener warns of the others. A
-        time before the last one is a recording that starts anew, or a second source, and is
-        published: tf2 sorts.
+        tf2 takes only the first transform with a given stamp, and every listener warns about the
+        others. An earlier stamp comes from a recording that starts over, or from a second source.
+        It is published: tf2 sorts.
         """
         if self._ignores_time:
             return True
@@ -241,8 +236,8 @@ class JointGroup:
         """Return the TFMessage for these positions, in the names' order, at a stamp in ns.
 
         Raises:
-            ValueError: with a sentence that is the same for the same fault, if a position is not
-                finite or a message cannot hold the time.
+            ValueError: if a position is not finite or a message cannot hold the time; the same
+                fault has the same sentence.
         """
         q = positions[self._columns].astype(np.float64, copy=False)
         if not np.isfinite(q).all():

@@ -27,7 +27,7 @@ def main(argv: Sequence[str]) -> int:
 def joints(own: Own, stop: Stop) -> None:
     """Publish the moving edges of each ``joint_states`` message.
 
-    Latch the description where no ``static`` does.
+    Latches the description if no ``static`` process does.
     """
     # ROS, once signals are handled.
     from tfcompose.launcher.publishers.description import CHECK_EVERY_S, DescriptionPublisher  # noqa: PLC0415
@@ -81,7 +81,7 @@ def joints(own: Own, stop: Stop) -> None:
 
 
 class _Missing:
-    """Names once, after some seconds, the joints that no joint state speaks of."""
+    """Names once, after some seconds, the joints missing from all joint states."""
 
     def __init__(self, mover: JointMover, topic: str, publishers: Callable[[], list[str]]) -> None:
         self._mover, self._topic, self._publishers = mover, topic, publishers

@@ -16,22 +16,25 @@ SLIDING = ("prismatic",)
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """A joint's position: ``multiplier`` · positions[``column``] + ``offset``, rad or m."""
+    """A joint whose position a message determines: multiplier · positions[column] + offset."""
 
+    #: Index of the joint.
     joint: int
+    #: Index into the message's positions.
     column: int
     multiplier: float
+    #: In radians, or metres for a prismatic joint.
     offset: float
 
 
 class Joints:
-    """Joints, each of a type that has a single position, and their mimics.
+    """Joints with a single position each, and their mimics.
 
-    A joint that mimics another follows it, also through a chain and in any order: multiplier · q +
-    offset at each step. As in robot_state_publisher, a position that was sent for the mimic itself
-    wins over the one it would follow. Only what a message says is determined by it: a joint that
-    it says nothing about was measured at another time, and that message's stamp would be false for
-    it. Joints that follow each other in a circle are never determined.
+    A mimic follows its joint, through chains and in any order: multiplier · q + offset at each
+    step. As in robot_state_publisher, a position sent for the mimic itself takes precedence. A
+    message determines only the joints that it names, and their mimics: any other joint was
+    measured at another time, and the message's stamp would be wrong for it. Joints that mimic each
+    other in a circle are never determined.
     """
 
     def __init__(self, joints: Sequence[PlanJoint]) -> None:
@@ -41,7 +44,7 @@ class Joints:
     def follow(self, names: Sequence[str]) -> list[Followed]:
         """Return the joints that a message with these names determines.
 
-        Of a name that comes twice the first counts.
+        The first of two equal names counts.
         """
         columns: dict[str, int] = {}
         for column, name in enumerate(names):

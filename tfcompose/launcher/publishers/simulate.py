@@ -1,8 +1,6 @@
-"""The process that stands in for an owner.
+"""Stand-in for an owner: its edges or joint states, at the plan's rate and by its clock.
 
-Its edges, or joint states, at the plan's rate and by the plan's clock.
-
-How what it simulates moves are pure functions, in seconds, metres and radians.
+The simulated motions are pure functions, in seconds, metres and radians.
 """
 
 from __future__ import annotations
@@ -95,10 +93,7 @@ def _joint_states(
 
 
 def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
-    """Give seconds since the start and the time to stamp with, at ``rate``.
-
-    Ticks that were missed are left out.
-    """
+    """Yield seconds since the start and the time to stamp with, at ``rate``; skip missed ticks."""
     start, tick = time.monotonic(), 0
     while not stop.wait(max(0.0, start + tick / rate - time.monotonic())):
         elapsed_s = time.monotonic() - start
@@ -107,7 +102,7 @@ def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
 
 
 def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
-    """Give the same by /clock: nothing while it stands, and a new start when it jumps back."""
+    """Yield the same by /clock: nothing while it is paused, a new start when it jumps back."""
     # ROS, once signals are handled.
     from tfcompose.tf.ros.clock import CLOCK_AFTER_S, SimClock, no_clock  # noqa: PLC0415
     from tfcompose.tf.ros.node import wait  # noqa: PLC0415 (ROS, once signals are handled)
@@ -134,10 +129,10 @@ def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int
 
 
 class JointSource:
-    """The simulated joints, followed by those that mimic them, also through chains.
+    """The simulated joints and their mimics, also through chains.
 
-    A robot_state_publisher of the stock kind follows a chain only in the order of the names, so
-    that mimics are sent with their own values.
+    robot_state_publisher follows a chain of mimics only in the order of the names, so mimics are
+    sent with their own values.
     """
 
     def __init__(self, simulation: Simulation, joints: Sequence[PlanJoint]) -> None:
@@ -152,7 +147,7 @@ class JointSource:
         self.names = own + [name for name in followed if name not in simulation.joints]
 
     def positions(self, time_s: float) -> list[float]:
-        """Return where they are so many seconds after the start: rad, or m of those that slide."""
+        """Return the positions ``time_s`` after the start: rad, or m for prismatic joints."""
         own = [start for start, _ in self._moves]
         for index, (rest, sweep) in enumerate(self._moves):
             if sweep:
@@ -165,9 +160,8 @@ class JointSource:
 def circle(radius: float, speed: float, time_s: float) -> Pose:
     """Return the pose, in the circle's centre, of a body that drives on it.
 
-    X = r cos ωt, y = r sin ωt.
-
-    ``speed`` is ω in rad/s, counter-clockwise where positive. The body looks where it goes.
+    x = r cos ωt, y = r sin ωt. ``radius`` is r in metres, ``speed`` is ω in rad/s,
+    counter-clockwise if positive. The body faces its direction of travel.
     """
     angle = speed * time_s
     heading = angle + math.copysign(math.pi / 2, speed)
@@ -179,9 +173,9 @@ def circle(radius: float, speed: float, time_s: float) -> Pose:
 def swept(sweep: Sweep, start: float, time_s: float) -> float:
     """Return the position (rad or m) of a joint that sweeps from ``start`` at time 0.
 
-    To and fro it is a sine about the middle, which sets out upwards: the position and its speed
-    have no steps, and the speed is π · (upper - lower) / period at most. Round and round the angle
-    is between -π and π.
+    Back and forth is a sine about the middle, upwards at first: position and speed have no steps,
+    and the speed is at most π · (upper - lower) / period. A continuous rotation keeps the angle
+    between -π and π.
     """
     phase = math.tau * time_s / sweep.period_s
     if sweep.lower is None or sweep.upper is None:

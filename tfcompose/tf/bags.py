@@ -43,7 +43,7 @@ _NAMED_AT_MOST = 12
 class BagError(Exception):
     """Raised when a bag cannot be read.
 
-    The message is one sentence for the user, ``help`` what to do.
+    The message is one sentence for the user; ``help`` is the advice.
     """
 
     def __init__(self, message: str, advice: str = "") -> None:
@@ -53,23 +53,22 @@ class BagError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class RecordedMessage:
-    """One TFMessage of a bag, on one of the ``topics`` (moving, fixed).
+    """One TFMessage of a bag."""
 
-    ``rows`` is None where it cannot be decoded.
-
-    ``received_ns`` is when it was recorded, ``clock_ns`` the newest time on /clock then, None
-    where none was recorded.
-    """
-
+    #: The pair (moving, fixed) that has the message's topic.
     topics: Topics
+    #: None: it cannot be decoded.
     rows: Sequence[Row] | None
+    #: True: it is on the topic of fixed edges.
     static: bool
+    #: When it was recorded.
     received_ns: int
+    #: The newest time on /clock at that time; None: none was recorded.
     clock_ns: int | None = None
 
 
 def missing_rosbags() -> str | None:
-    """Return None when bags can be read, else one sentence that says what to install."""
+    """Return None if bags can be read, else one sentence that says what to install."""
     if find_spec("rosbags") is not None:
         return None
     return (
@@ -81,9 +80,8 @@ def missing_rosbags() -> str | None:
 class Recording:
     """A bag: a folder, or a single .mcap or .db3 file.
 
-    A folder without metadata.yaml is read file by file.
-
-    ``end_ns`` is when the last message of any topic was recorded, 0 before it was read.
+    A folder without metadata.yaml is read file by file. ``end_ns`` is when the last message of any
+    topic was recorded, 0 until it has been read.
 
     Raises:
         BagError: if there is none.
@@ -99,8 +97,8 @@ class Recording:
         """Yield the messages of the pairs of topics (moving, fixed) in recorded order.
 
         Raises:
-            BagError: if it has none of the topics, is no bag, is damaged, or its messages are not
-                TF's.
+            BagError: if the bag has none of the topics, is not a bag or damaged, or its messages
+                have another type.
         """
         from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
 
@@ -131,7 +129,7 @@ class Recording:
             raise _no_topic(self.path, pairs, others)
 
     def _with_clock(self, reader: Any, wanted: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
-        """Yield the messages of these connections, and note what comes on /clock between them."""
+        """Yield the messages of these connections, and record /clock between them."""
         clocks = [
             each for each in reader.connections if (each.topic, each.msgtype) == ("/clock", CLOCK)
         ]
@@ -148,7 +146,7 @@ class Recording:
 class BagFeed:
     """Feeds a bag's messages to the observers of pairs of topics (moving, fixed).
 
-    Topics may be missing as long as some are there.
+    Topics may be missing as long as the bag has one of them.
 
     Raises:
         BagError: if there is no bag.
@@ -166,9 +164,9 @@ class BagFeed:
         """End."""
 
     def take(self, timeout_s: float, stop: Stop) -> bool:
-        """Put all of the bag into the observers, and note when it ends.
+        """Pass the whole bag to the observers, and note its end.
 
-        Return that no more comes.
+        Returns False: there are no more messages.
 
         Raises:
             BagError: if the bag cannot be read.
@@ -196,15 +194,16 @@ class BagFeed:
         return False
 
     def elsewhere(self) -> tuple[str, ...]:
-        """Return no topics: a bag with TF on others only is refused with their names."""
+        """Return no topics: a bag with TF only on other topics is rejected with their names."""
         return ()
 
 
 def echo_bag(path: str, query: PoseQuery, on_pose: OnPose) -> NoPose | None:
-    """Give poses of a bag as they were recorded.
+    """Pass poses of a bag to ``on_pose`` as they were recorded.
 
-    That is the first one with ``once``, the one at ``at_ns`` where that is not 0, else ``rate`` of
-    them for each second of the recording. Return None if there was one, else why there was none.
+    With ``once`` it is the first one, with an ``at_ns`` other than 0 the one at that time, else
+    ``rate`` of them for each second of the recording. Return None if there was one, else the
+    reason.
 
     Raises:
         BagError: if the bag cannot be read.
@@ -223,7 +222,7 @@ def echo_bag(path: str, query: PoseQuery, on_pose: OnPose) -> NoPose | None:
 
 
 class _Replay:
-    """The buffer as it was at a time of the recording, and what was given until then."""
+    """The buffer at a time of the recording, and the poses returned until then."""
 
     def __init__(self, query: PoseQuery, on_pose: OnPose) -> None:
         self.newest_ns = 0
@@ -243,7 +242,7 @@ class _Replay:
             )
 
     def is_done(self, now_ns: int) -> bool:
-        """Give the pose where it is time, and return whether that was the last one."""
+        """Give the pose when it is due, and return whether it was the last one."""
         query = self._query
         if query.at_ns < 0 or now_ns < self._next_ns:
             return False
@@ -258,7 +257,7 @@ class _Replay:
         return query.once or query.at_ns > 0
 
     def explain_end(self) -> NoPose | None:
-        """Return None if there was a pose until the end, else why there was none."""
+        """Return None if there was a pose by the end, else the reason."""
         if self._gave:
             return None
         try:
@@ -280,10 +279,10 @@ def _rows(decoder: Decoder, data: bytes) -> Sequence[Row] | None:
 
 
 def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
-    """Whether the connection is a wanted topic with TF.
+    """Return whether the connection is a wanted topic with TF.
 
     Raises:
-        BagError: if its messages are named as TF's and hold something else.
+        BagError: if its topic has a TF name but another type.
     """
     if connection.topic not in wanted or connection.msgtype != TF_MESSAGE:
         return False
@@ -301,7 +300,7 @@ def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
 
 
 def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) -> BagError:
-    """Return what to say where none of the topics is: which TF topics the bag has instead."""
+    """Return the error for a bag without the topics: it names the TF topics that the bag has."""
     requested = [topic for pair in pairs for topic in pair]
     for topic, type_ in sorted(held):
         if topic in requested:
@@ -326,12 +325,12 @@ def _help_of(type_: str) -> str:
 
 
 def _files_at(path: Path) -> list[Path]:
-    """Return what is to be read, in this order.
+    """Return the files to read, in order.
 
     A folder with its metadata, a file, or the files of a folder.
 
     Raises:
-        BagError: if there is nothing there, or nothing that is a bag.
+        BagError: if nothing is there, or nothing is a bag.
     """
     if path.name == "metadata.yaml":
         path = path.parent
@@ -364,7 +363,7 @@ def _files_at(path: Path) -> list[Path]:
 
 
 def _in_order(file: Path) -> list[tuple[int, str]]:
-    """Order names by the numbers in them: a bag that was split is numbered."""
+    """Return a key that sorts names by the numbers in them, as in the parts of a split bag."""
     return [_order_of(part) for part in re.split(r"(\d+)", file.name)]
 
 
@@ -373,7 +372,7 @@ def _order_of(part: str) -> tuple[int, str]:
 
 
 def damage_error(path: str, error: Exception) -> BagError:
-    """Return what to say where the library cannot read a bag."""
+    """Return the error for a bag that the library cannot read."""
     reason = " ".join(str(error).split()) or type(error).__name__
     advice = ""
     if "end magic" in reason:

@@ -33,14 +33,12 @@ _CHECK_EVERY_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """One of the plan's processes, as it runs.
-
-    ``given`` is what follows ``--ros-args`` on its command line.
-    """
+    """One of the plan's processes, as it runs."""
 
     plan: Plan
     process: PlanProcess
     file: Path
+    #: The arguments after ``--ros-args`` on its command line.
     given: tuple[str, ...]
 
     @property
@@ -50,14 +48,14 @@ class Own:
 
     @property
     def namespace(self) -> str:
-        """The rest of its node's full name: empty, or with a slash in front."""
+        """The rest of its node's full name: empty, or with a leading slash."""
         return self._full_name.rpartition("/")[0]
 
     @property
     def ros_args(self) -> list[str]:
         """The ROS arguments of its node.
 
-        What is on the command line, which comes first, and the plan's remappings.
+        Those of the command line come first, then the plan's remappings.
         """
         return [
             *self.given,
@@ -97,11 +95,11 @@ def say(line: str) -> None:
 def start(argv: Sequence[str], kind: str, role: Callable[[Own, Stop], None]) -> int:
     """Run the process that ``argv`` names until a signal comes, and return the exit code.
 
-    ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. ``role`` is what the
-    process does. It imports ROS, which takes a third of a second, when it is called: signals are
-    handled by then, and whoever is interrupted ends without a traceback. It waits for
-    ``wait_for_go`` before its first message. Of a robot on several computers, one that began
-    without a network leaves ROS when there is one, and begins anew in the same process.
+    ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. ``role`` is the body of
+    the process. It imports ROS, which takes a third of a second, only when it is called. Signals
+    are handled by then, so an interrupted process ends without a traceback. It calls
+    ``wait_for_go`` before its first message. For a robot on several computers, a process that
+    began without a network leaves ROS once there is one, and starts over in the same process.
 
     Returns:
         0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
@@ -162,11 +160,11 @@ def _unfit(message: str, file: str) -> RejectedError:
 
 
 def wait_for_go(stop: Stop) -> bool:
-    """Wait before the first message until the launcher, if it holds this process, releases it.
+    """Wait before the first message until the launcher releases this process, if it holds it.
 
-    Return False if the process is to end instead. ``up`` checks before the start whether an edge
-    is published already. Its publishers join ROS meanwhile, so that listeners know them when the
-    launcher releases them. A process that ends and begins anew is still held.
+    Return False if the process is to end instead. Before the start, ``up`` checks whether an edge
+    is already published. Meanwhile its publishers join ROS, so that listeners know them when the
+    launcher releases them. A process that starts over is still held.
     """
     if HOLD_FD not in os.environ:
         return not stop.requested
@@ -184,7 +182,7 @@ def wait_for_go(stop: Stop) -> bool:
 def ready() -> None:
     """Tell systemd that this process is ready, as sd_notify(3) does.
 
-    Without systemd do nothing.
+    Does nothing without systemd.
     """
     address = os.environ.get("NOTIFY_SOCKET", "")
     if address[:1] not in {"/", "@"}:

@@ -1,6 +1,6 @@
-"""Statistics of arrivals: rate, jitter and delay over a recent time, of bounded size.
+"""Statistics of arrivals: rate, jitter and delay over recent time, in bounded memory.
 
-Times are integer nanoseconds; what comes back is in seconds and hertz.
+Times are integer nanoseconds; results are in seconds and hertz.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ PAUSE = 10.0
 
 @dataclass(slots=True)
 class _Sums:
-    """Of the gaps between arrivals, and of the delays, what means and deviations are made of."""
+    """Sums over gaps between arrivals and over delays, for means and deviations."""
 
     begun_ns: int = 0
     gaps: int = 0
@@ -49,7 +49,7 @@ class _Sums:
         self.delays_ns += delay_ns
 
     def plus(self, other: _Sums) -> _Sums:
-        """Return both together."""
+        """Return the sums over both."""
         longest = max(self, other, key=lambda each: (each.longest_ns, each.longest_ended_ns))
         spans = [(each.least_ns, each.most_ns) for each in (self, other) if each.delays]
         return _Sums(
@@ -68,39 +68,36 @@ class _Sums:
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """What was measured; None where too little came.
+    """Measured timing; None: too few arrivals."""
 
-    Attributes:
-        rate: arrivals a second, in hertz; it falls while nothing comes.
-        jitter_s: the standard deviation of the time between two arrivals.
-        longest_gap_s: the longest time between two arrivals.
-        since_gap_s: how long ago that ended.
-        delay_s: the mean of arrival minus stamp; negative: stamped ahead of the receiver's clock.
-        least_delay_s: the least of these.
-        most_delay_s: the largest of these.
-    """
-
+    #: Arrivals per second; it falls while none comes.
     rate: float | None = None
+    #: Standard deviation of the time between two arrivals.
     jitter_s: float | None = None
+    #: Longest time between two arrivals.
     longest_gap_s: float | None = None
+    #: Time since the end of the longest gap.
     since_gap_s: float | None = None
+    #: Mean of arrival minus stamp; negative: stamped ahead of the receiver's clock.
     delay_s: float | None = None
+    #: Minimum of arrival minus stamp.
     least_delay_s: float | None = None
+    #: Maximum of arrival minus stamp.
     most_delay_s: float | None = None
 
 
 @dataclass(slots=True)
 class Arrivals:
-    """Counts arrivals over the last one to two ``window_ns``, or over all if that is 0.
+    """Counts arrivals over a sliding window.
 
-    A pause that was longer than the window counts as the longest gap for one window, and in
-    nothing else.
-
-    Of arrivals in the first ``settle_ns`` only the number counts: a new subscriber gets at once
-    what was kept for it.
+    A pause longer than the window counts as the longest gap for one window, and does not affect
+    the other values.
     """
 
+    #: The window is one to two of these; 0: all arrivals.
     window_ns: int = 0
+    #: Arrivals in this first period only count as a number, because a new subscriber receives
+    #: latched messages at once.
     settle_ns: int = 0
     count: int = 0
     last_ns: int = 0
@@ -110,7 +107,7 @@ class Arrivals:
     _resumed_ns: int = 0
 
     def note_arrival(self, at_ns: int, delay_ns: int | None) -> None:
-        """Note an arrival, and how old its stamp was where that is known."""
+        """Note an arrival, and the age of its stamp if known."""
         self.count += 1
         if self.count == 1:
             self._now.begun_ns = at_ns
@@ -139,7 +136,7 @@ class Arrivals:
         return gap_ns > self.window_ns and is_unusual
 
     def note_resumption(self, at_ns: int) -> None:
-        """Note an arrival after a pause that is no gap."""
+        """Note an arrival after a pause that does not count as a gap."""
         if self.count:
             self.count += 1
             self.last_ns = at_ns
@@ -147,7 +144,7 @@ class Arrivals:
             self.note_arrival(at_ns, None)
 
     def timing(self, now_ns: int) -> Timing:
-        """Return what was measured until ``now_ns``, of the clock of the arrivals."""
+        """Return the timing until ``now_ns``, on the clock of the arrivals."""
         sums = self._before.plus(self._now)
         delays: tuple[float | None, float | None, float | None] = (None, None, None)
         if sums.delays:
@@ -175,9 +172,9 @@ class Arrivals:
         )
 
     def steady_rate(self, least_ns: int) -> float | None:
-        """Return the rate without the longest gap, which may be a hiccup.
+        """Return the rate in hertz without the longest gap, which may be a hiccup.
 
-        None while the gaps add up to less time.
+        None while the gaps add up to less than ``least_ns``.
         """
         sums = self._before.plus(self._now)
         rest_ns = sums.gaps_ns - sums.longest_ns

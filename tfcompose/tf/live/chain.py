@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """How old the newest stamp of an edge is, in seconds.
+    """Age of an edge's newest stamp just before the next one arrives, in seconds.
 
-    In the mean, and at most, just before the next one comes.
+    As mean and maximum.
     """
 
     edge: EdgeState
@@ -27,23 +27,17 @@ class Delay:
 
 @dataclass(frozen=True, slots=True)
 class FrameChain:
-    """The frames from A to B, and their edges.
-
-    Of each the one that counts, the newest, and those of other publishers.
-
-    ``newest`` and ``all_edges`` are in the order of ``frames``.
-    """
+    """The frames from A to B, and their edges."""
 
     frames: tuple[str, ...]
+    #: The edge that counts for each frame, in the order of the frames: the newest.
     newest: tuple[EdgeState, ...]
+    #: All publishers' edges, in the order of the frames.
     all_edges: tuple[EdgeState, ...]
 
     @property
     def delay(self) -> Delay | None:
-        """The delay of the edge that is the most behind, which is that of the pose.
-
-        None where none moves.
-        """
+        """The delay of the edge that lags most, and so of the pose; None if no edge moves."""
         delays = [delay for edge in self.newest if (delay := _delay(edge))]
         return max(delays, key=lambda delay: delay.mean_s, default=None)
 
@@ -51,8 +45,7 @@ class FrameChain:
 def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | str:
     """Return the chain between two frames, or why there is none.
 
-    Of several publishers of a frame the one counts whose message is the newest, as in tf2; what
-    tf2 refuses does not.
+    If a frame has several publishers, the newest message counts, as in tf2, unless tf2 rejects it.
     """
     by_child: dict[str, list[EdgeState]] = {}
     for edge in edges:
@@ -78,7 +71,7 @@ def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | st
 
 
 def _above(by_child: dict[str, list[EdgeState]], frame: str) -> list[str]:
-    """Return the frame and those above it, up to the root, or all of a loop once."""
+    """Return the frame and its ancestors up to the root, or all frames of a loop once."""
     found = [frame]
     while frame in by_child and (frame := by_child[frame][0].parent) not in found:
         found.append(frame)

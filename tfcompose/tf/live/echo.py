@@ -1,4 +1,4 @@
-"""The live pose of one frame in another."""
+"""Live pose of one frame in another."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ TOO_EARLY = (
 
 
 def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
-    """Give poses of the live tree as they come.
+    """Pass poses of the live tree to ``on_pose`` as they arrive.
 
-    A pose whose time is that of the last one is not new and not given again. Return None after one
-    pose with ``once``, or when ``stop`` is requested; else why there was no new one for so long.
+    A pose with the time of the last one is not new, and skipped. Return None after one pose with
+    ``once``, or when ``stop`` is requested; else the reason why no new pose came within the
+    timeout.
     """
     listened = _Listened(query)
     with open_node("tfcompose_echo", "") as node:
@@ -75,7 +76,7 @@ def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
 
 
 class _Listened:
-    """What came, and why there is no pose in it."""
+    """Received messages, and why they have no pose."""
 
     def __init__(self, query: PoseQuery) -> None:
         self.buffer = Buffer()
@@ -95,14 +96,14 @@ class _Listened:
         self._rejected = next(iter(rejected), self._rejected)
 
     def follow(self, clock_ns: int | None) -> None:
-        """Forget moving edges when simulated time jumps back, as tf2's buffers do."""
+        """Drop moving edges when simulated time jumps back, as tf2's buffers do."""
         if clock_ns is not None and clock_ns < self._clock_ns:
             self.buffer.clear()
             self._rejected = None
         self._clock_ns = clock_ns or self._clock_ns
 
     def explain_missing(self, reason: str) -> NoPose:
-        """Return why there was no pose, with what explains it."""
+        """Return the reason for the missing pose, with its explanation."""
         if beyond := sum(self.bounds.beyond.values()):
             reason += (
                 f"; {beyond} transforms of further frames came, of publishers that send too many"

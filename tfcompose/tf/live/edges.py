@@ -1,8 +1,8 @@
 """Observation of edges for monitor, verify, view and doctor: publisher, rate and delay of each.
 
 An observer takes messages from a subscription or a bag, and the endpoints of the graph; it reads
-no clock and no topic. Its memory does not grow with time, and is bounded for publishers that
-invent names. Times are nanoseconds.
+no clock and no topic. Its memory does not grow with time, and is bounded even if a publisher keeps
+inventing frame names. Times are nanoseconds.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _SECOND_NS = 1_000_000_000
 def nearer_clock(
     rows: Sequence[Row], received_ns: int, clock_ns: int | None, *, static: bool
 ) -> int | None:
-    """Return the time of /clock if stamps are nearer to it than to ``received_ns``."""
+    """Return the time of /clock if stamps are nearer to it than to ``received_ns``, else None."""
     if clock_ns is None or static or not rows:
         return None
     stamp_ns = rows[0][2] * _SECOND_NS + rows[0][3]
@@ -322,9 +322,9 @@ class TreeObserver:
     def _new(
         self, row: Row, *, static: bool, gid: bytes | None, received_ns: int, is_full: bool
     ) -> EdgeStream | None:
-        """Return the stream of an edge that is new, or written with a slash.
+        """Return the stream of an edge that is new, or has a leading slash.
 
-        None where there are too many.
+        None if there are too many.
         """
         parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
         stream = self._streams.get((parent, child, gid, static))
@@ -345,29 +345,29 @@ class TreeObserver:
         return stream
 
     def take_malformed(self, gid: bytes | None) -> None:
-        """Count a message that is no TFMessage."""
+        """Count a message that cannot be decoded as TFMessage."""
         if gid in self.malformed or len(self.malformed) < MOST_EDGES:
             self.malformed[gid] = self.malformed.get(gid, 0) + 1
 
     def take_graph(self, publishers: Sequence[Publisher], nodes: Sequence[str] = ()) -> None:
-        """Take who is in the graph now, and the names of its nodes.
+        """Take the current publishers, and the names of the graph's nodes.
 
-        What is known of one that has left is kept.
+        Keeps what is known about publishers that have left.
         """
         self.nodes = tuple(nodes)
         self.publishers.update(publishers)
 
     @property
     def until_ns(self) -> int:
-        """Until when anything is known: the end of the recording, or the last look.
+        """The time up to which anything is known: the recording's end, or the last look.
 
-        Who looks late blames nobody.
+        A late look therefore does not make publishers seem silent.
         """
         return self.end_ns or self.observed_ns or self.last_ns
 
     @property
     def received_any(self) -> bool:
-        """Whether anything came, be it readable or not."""
+        """Whether any message came, readable or not."""
         return bool(self.messages or self.malformed)
 
     @property
@@ -377,11 +377,11 @@ class TreeObserver:
 
     @property
     def streams(self) -> tuple[EdgeStream, ...]:
-        """Each edge of each publisher, in the order in which they came first."""
+        """Each edge of each publisher, in the order of their first arrivals."""
         return tuple(self._streams.values())
 
     def edges(self, now_ns: int) -> list[EdgeState]:
-        """Return the state of each edge at ``now_ns`` of the receiver, by parent and child."""
+        """Return the state of each edge at the receiver's ``now_ns``, by parent and child."""
         streams = sorted(self._streams.values(), key=_order)
         return [self._state(stream, now_ns) for stream in streams]
 
@@ -406,7 +406,7 @@ class TreeObserver:
     def _publisher_nodes(self, stream: EdgeStream) -> tuple[str, ...]:
         """Return the publisher's node.
 
-        Without an id all on the topic, or all that were, where they have left.
+        Without an id, return all nodes on the topic, or if they have left, all former ones.
         """
         nodes = self.publishers.nodes(stream.gid, static=stream.static)
         if nodes or stream.gid is not None:
@@ -429,24 +429,24 @@ def _order(stream: EdgeStream) -> tuple[str, str, bool, int]:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """A frame in a tree. ``indent`` draws the lines to it; ``parent`` is None for a root.
-
-    ``observed`` are all who publish where it is, the one that counts first; ``planned`` is what
-    was expected of it.
-    """
+    """A frame in a drawn tree."""
 
     frame: str
+    #: None: a root.
     parent: str | None
+    #: The lines that lead to it.
     indent: str
+    #: Its edges from all publishers, the one that counts first.
     observed: tuple[EdgeState, ...] = ()
+    #: The expected edge.
     planned: PlanEdge | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """One root and all below it, as it is drawn.
+    """A root and all frames below it, in drawing order, or a loop.
 
-    Or the frames of a loop, the first one again last.
+    The loop has its first frame again at the end.
     """
 
     branches: tuple[Branch, ...]
@@ -458,9 +458,8 @@ def forest(
 ) -> list[Tree]:
     """Return the trees, the largest first, then the loops.
 
-    Planned edges (by child) without messages are part of it.
-
-    A frame with several parents is drawn below that of the newest message, as in tf2.
+    Includes planned edges (by child) without messages. A frame with several parents is drawn below
+    the parent of the newest message, as in tf2.
     """
     by_child: dict[str, list[EdgeState]] = {}
     for edge in edges:

@@ -1,7 +1,7 @@
-"""Feeds: where the messages of TF trees come from, and how observers get them.
+"""Feeds: sources of messages for the observers of TF trees.
 
-A feed puts what comes on pairs of topics (moving, fixed) into the observer of each pair: from ROS
-(``ros_feed``), from Zenoh where no ROS has rmw_zenoh (``zenoh_feed``), or from a recording
+A feed passes messages on pairs of topics (moving, fixed) to the observer of each pair: from ROS
+(``ros_feed``), from Zenoh if ROS has no rmw_zenoh (``zenoh_feed``), or from a recording
 (``tf.bags``).
 """
 
@@ -22,16 +22,16 @@ WAIT_S = 0.1
 
 
 class Feed(Protocol):
-    """Puts messages into observers, within its ``with`` block."""
+    """Passes messages to observers, within its ``with`` block."""
 
     def __enter__(self) -> Self:
         """Begin to listen, or raise RosError."""
 
     def __exit__(self, *_: object) -> None:
-        """Listen no more."""
+        """Stop listening."""
 
     def take(self, timeout_s: float, stop: Stop) -> bool:
-        """Wait for messages, at most so long, and put what has come into the observers.
+        """Wait up to ``timeout_s`` seconds for messages, and pass them to the observers.
 
         Return whether more may come.
 
@@ -41,7 +41,7 @@ class Feed(Protocol):
         """
 
     def elsewhere(self) -> tuple[str, ...]:
-        """Return the names of other topics on which there is TF."""
+        """Return the names of other topics with TF."""
 
 
 def follow(
@@ -52,9 +52,9 @@ def follow(
     every_s: float = WAIT_S,
     show: Callable[[], object] | None = None,
 ) -> float:
-    """Take from a feed for some seconds, or until ``stop`` is requested or nothing more may come.
+    """Take from a feed for some seconds, or until ``stop`` is requested or the feed ends.
 
-    ``show`` is called ``every_s``. Return for how many seconds it listened.
+    Calls ``show`` every ``every_s`` seconds. Return the seconds that it listened.
 
     Raises:
         RosError: if ROS cannot take messages.

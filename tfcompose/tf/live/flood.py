@@ -1,4 +1,4 @@
-"""Bounds on what a publisher of ever new edges costs an observer: edges kept, and time to read."""
+"""Bounds for publishers that keep inventing edges: edges kept, and time to read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BUSY_S = 0.1
 class ReadingTime:
     """Bounds the time for unfamiliar messages from publishers of too many edges.
 
-    Their messages are skipped while the time of this second is used up; ``skipped`` counts them.
+    Their messages are skipped once this second's time is used up; ``skipped`` counts them.
     """
 
     def __init__(self, decoder: Decoder) -> None:
@@ -56,9 +56,9 @@ class ReadingTime:
 
 
 class EdgeBounds:
-    """The edges of each publisher that are kept.
+    """The kept edges of each publisher.
 
-    ``beyond`` counts transforms of others, by their publisher's id.
+    ``beyond`` counts transforms of all other edges, by publisher id.
     """
 
     def __init__(self) -> None:

@@ -25,7 +25,7 @@ MOST_LISTS = 64
 
 @dataclass(slots=True)
 class _Sent:
-    """What a publisher sent: its newest lists of names, each with when it came last."""
+    """A publisher's newest lists of names, each with its last arrival."""
 
     first_ns: int
     lists: list[tuple[JointNames, int]] = field(default_factory=list)
@@ -40,7 +40,7 @@ class _Sent:
 
 
 class JointStates:
-    """Listens to a topic of joint states; what came is taken when it is asked for."""
+    """Subscription to a topic of joint states; ``take`` reads pending messages."""
 
     def __init__(self, node: Node, topic: str) -> None:
         self.topic = topic
@@ -50,7 +50,7 @@ class JointStates:
         self._nodes: dict[bytes, str] = {}
 
     def take(self) -> None:
-        """Take what has come, and who sent it; a message that is no joint state is left out."""
+        """Read pending messages with their senders; skip messages that are not joint states."""
         for received in self._subscription.take():
             self._take(received)
         if self._sent.keys() - self._nodes.keys():
@@ -71,7 +71,7 @@ class JointStates:
         self._sent[gid] = sent
 
     def sent_joints(self) -> tuple[SentJoints, ...]:
-        """Return what each publisher sent, those that have left among them."""
+        """Return what each publisher sent, including those that have left."""
         return tuple(
             SentJoints(
                 self.topic,
@@ -84,7 +84,7 @@ class JointStates:
         )
 
     def forget(self, before_ns: int) -> None:
-        """Forget what was not sent since then, in nanoseconds of the system's clock."""
+        """Drop what was last sent before that time, in nanoseconds of the system clock."""
         for sent in self._sent.values():
             sent.lists = [names_at for names_at in sent.lists if names_at[1] >= before_ns]
         self._sent = {gid: sent for gid, sent in self._sent.items() if sent.lists}

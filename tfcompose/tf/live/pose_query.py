@@ -1,4 +1,4 @@
-"""Requested poses of one frame in another, live or from a bag, and why not."""
+"""Requested poses of one frame in another, live or from a bag, and the reason if there is none."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PoseQuery:
-    """Which poses to give: of ``source`` in ``target``; once, or ``rate`` times a second.
+    """Request for poses of one frame in another."""
 
-    ``timeout_s`` without a new one ends it. ``at_ns`` is the time of the pose, in nanoseconds
-    since the epoch; from 0 down it is counted from the newest. ``topics`` are those of moving and
-    of fixed edges.
-    """
-
+    #: The reference frame.
     target: str
+    #: The frame whose pose is returned.
     source: str
     once: bool
+    #: Poses per second, unless ``once``.
     rate: float
+    #: Without a new pose for this time, the query ends.
     timeout_s: float
+    #: The topics of moving and of fixed edges.
     topics: tuple[str, str]
+    #: Time of the pose in nanoseconds since the epoch; 0 or below: relative to the newest.
     at_ns: int = 0
 
     def pose_in(self, buffer: Buffer) -> tuple[Pose, int | None]:
@@ -48,11 +49,9 @@ class PoseQuery:
 
 @dataclass(frozen=True, slots=True)
 class NoPose:
-    """Why there was no pose, and what to do about it, where more is known than the reason says.
-
-    ``elsewhere`` are other topics on which there is TF, where nothing came; None: something did.
-    """
+    """The reason for a missing pose, with advice if more is known."""
 
     reason: str
     help: str = ""
+    #: Other topics with TF, if nothing came on these; None: messages came.
     elsewhere: tuple[str, ...] | None = None

@@ -1,6 +1,6 @@
-"""Publishers on TF topics by message ids, since when, and what messages say.
+"""Publishers on TF topics by message id, their history, and the contents of messages.
 
-What messages say is read fast where a publisher sends the same edges again and again.
+Reading is fast if a publisher sends the same edges repeatedly.
 """
 
 from __future__ import annotations
@@ -24,28 +24,31 @@ _MOST = 1024
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One TFMessage: its (parent, child) pairs, the topic's kind, who sent it, and when.
+    """One TFMessage with its sender and arrival."""
 
-    ``gid`` is the publisher's id, or None where the rmw gives none; ``sequence`` counts its
-    messages from 1. ``stamps_ns`` are the transforms' stamps; ``received_ns`` is when it came, by
-    this machine's system clock. ``exact`` says that its names are all that was sent: listeners of
-    other languages take more of one with a NUL. ``poses`` are there where frames are compared with
-    presets, in the first message of a publisher with these edges.
-    """
-
+    #: Pairs of (parent, child).
     edges: tuple[tuple[str, str], ...]
+    #: True: it came on a topic of fixed edges.
     static: bool
+    #: The publisher's id; None: the rmw does not provide it.
     gid: bytes | None
+    #: When it was sent, in nanoseconds of the system clock.
     source_ns: int
+    #: Number among the publisher's messages, from 1.
     sequence: int
+    #: The transforms' stamps.
     stamps_ns: Sequence[int] = ()
+    #: When it arrived, by this machine's system clock.
     received_ns: int = 0
+    #: Set if frames are compared with presets, in a publisher's first message with these edges.
     poses: Sequence[Pose] = ()
+    #: False: a name contains a NUL or invalid UTF-8, so listeners in other languages may read
+    #: another name.
     exact: bool = True
 
 
 class MessageReader:
-    """Reads messages, with poses in a publisher's first ones that hold one of ``frames``."""
+    """Reads messages; a publisher's first ones with one of ``frames`` include poses."""
 
     def __init__(self, frames: frozenset[str] = frozenset()) -> None:
         self._frames = frames
@@ -53,10 +56,10 @@ class MessageReader:
         self._posed: set[tuple[bytes | None, MessageLayout]] = set()
 
     def read(self, received: Received, *, static: bool) -> Message:
-        """Return the message, with frames named as tf2 takes them.
+        """Return the message, with frame names as tf2 reads them.
 
         Raises:
-            ValueError: with one sentence, if it is no TFMessage.
+            ValueError: with one sentence, if it is not a TFMessage.
         """
         layout, stamps = self.decoder.stamps(received.data)
         edges = layout.plain_edges
@@ -104,59 +107,56 @@ UNCOUNTED = 2**64 - 1
 
 @dataclass(frozen=True, slots=True)
 class OtherRun:
-    """A run of another robot: its name, ROBOT@DOMAIN, its launcher's process, and since when.
+    """A run of another robot."""
 
-    14:03:27, local time.
-    """
-
+    #: ROBOT@DOMAIN.
     name: str
+    #: The launcher's process id.
     pid: int
+    #: Local time of its start: 14:03:27.
     since: str
 
 
 @dataclass(frozen=True, slots=True)
 class Publisher:
-    """A publisher on a TF topic, as the graph shows it.
+    """A publisher on a TF topic, as the graph shows it."""
 
-    Attributes:
-        gid: its id, 16 bytes, which comes with its messages where the rmw says who sent them.
-        node: its node's full name, None while that is not known.
-        static: whether its topic is one of fixed edges.
-        topic: its topic's full name.
-        type: its type, such as ``tf2_msgs/msg/TFMessage``.
-        latched: whether its durability is transient_local.
-        reliable: whether its reliability is reliable.
-        where: on which machine and as which process it runs; empty if that is not known.
-        ours: whether that process is of the guard's own run; None: not known.
-        fenced: whether it sends behind the fence of a strict plan; None: there is no fence.
-        others: further nodes of which it may be one.
-        process: the plan's process that it is of, where that was seen.
-        run: the run of another robot that it is of, where that was seen.
-        profile: the profile file that its process was started with instead of the fence's; empty:
-            none, or not known.
-        unmarked: the number of its process, where that descends from the run's launcher, and its
-            environment was cleared, so that nothing says which of the plan's processes it is of.
-    """
-
+    #: Its id, 16 bytes; its messages have the same if the rmw identifies senders.
     gid: bytes
+    #: Its node's full name; None: unknown so far.
     node: str | None
+    #: True: its topic is for fixed edges.
     static: bool
+    #: Its topic's full name.
     topic: str = ""
+    #: Such as ``tf2_msgs/msg/TFMessage``.
     type: str = ""
+    #: True: its durability is transient_local.
     latched: bool = True
+    #: True: its reliability is reliable.
     reliable: bool = True
+    #: Its machine and process; empty: unknown.
     where: str = ""
+    #: Whether its process belongs to the guard's own run; None: unknown.
     ours: bool | None = None
+    #: Whether a strict plan's isolation applies to it; None: there is none.
     fenced: bool | None = None
+    #: Further nodes that it may belong to.
     others: tuple[str, ...] = ()
+    #: The plan's process that it belongs to; empty: unknown.
     process: str = ""
+    #: The other robot's run that it belongs to; None: unknown.
     run: OtherRun | None = None
+    #: The profile file that its process started with instead of the plan's; empty: none, or
+    #: unknown.
     profile: str = ""
+    #: Process id of a descendant of the run's launcher with a cleared environment, so that its
+    #: process of the plan is unknown; 0: it is none.
     unmarked: int = 0
 
     @property
     def nodes(self) -> tuple[str, ...]:
-        """The nodes of which one is the publisher's; none while it has no name."""
+        """The candidates for its node; none while it has no name."""
         return () if self.node is None else (self.node, *self.others)
 
 
@@ -172,12 +172,10 @@ def forget_oldest(known: dict[Key, Any], present: Collection[Key]) -> None:
 
 
 class Publishers:
-    """All publishers that the graph has shown.
+    """All publishers that the graph has shown: present ones, and the names of those that left.
 
-    Those that are there, and the names of those that have left.
-
-    Where the rmw does not say who sent a message (``says_who``), ids of messages tell senders
-    apart, and any node on the topic may be the one.
+    If the rmw does not identify senders (``says_who``), message ids only distinguish them, and any
+    node on the topic may be the sender.
     """
 
     def __init__(self, *, says_who: bool = True) -> None:
@@ -190,7 +188,7 @@ class Publishers:
         self.known: dict[bytes, Publisher] = {}
 
     def update(self, publishers: Sequence[Publisher]) -> None:
-        """Take who is in the graph now."""
+        """Take the publishers in the graph now."""
         self.queried = True
         self.present = {publisher.gid: publisher for publisher in publishers}
         self.known |= {
@@ -205,18 +203,17 @@ class Publishers:
         return gid is not None and gid in self.known and self.known[gid].node is not None
 
     def is_sure(self, gid: bytes | None) -> bool:
-        """Return whether the id says whose it is.
+        """Return whether the id identifies the publisher.
 
-        By the graph, once it shows the publisher's name.
+        It does once the graph shows the publisher's name.
         """
         return gid is not None and (self.says_who or self.is_named(gid))
 
     def nodes(self, gid: bytes | None, *, static: bool) -> tuple[str, ...]:
-        """Return the publisher's node, nothing while it is not known.
+        """Return the publisher's node; empty while unknown.
 
-        All on the topic where ids do not say whose.
-
-        One that sends behind a fence of remappings has an id in any case.
+        If ids do not identify publishers, return all nodes on the topic, except those isolated by
+        remapping, which have an id in any case.
         """
         if gid is not None and self.is_sure(gid):
             return self.known[gid].nodes if gid in self.known else ()
@@ -232,7 +229,7 @@ class Publishers:
         )
 
     def publishers_of(self, nodes: Collection[str], *, static: bool) -> list[bytes]:
-        """Return the publishers that are there of these nodes, on that kind of topic."""
+        """Return the present publishers of these nodes, on that kind of topic."""
         there = self.present.values()
         return [
             publisher.gid
@@ -241,20 +238,20 @@ class Publishers:
         ]
 
     def where(self, gid: bytes | None) -> str:
-        """Return where the publisher runs, empty where that is not known."""
+        """Return where the publisher runs; empty if unknown."""
         return self.known[gid].where if gid is not None and gid in self.known else ""
 
     def is_present(self, gid: bytes | None) -> bool:
-        """Return whether the publisher is there.
+        """Return whether the publisher is present.
 
-        One whose id does not say whose it is, is while anybody is.
+        If its id does not identify it, return whether any publisher is.
         """
         return gid in self.present if self.is_sure(gid) else bool(self.present)
 
 
 @dataclass(slots=True)
 class MessageCounter:
-    """One publisher: when it was first heard, and how fast it counts."""
+    """One publisher: its first arrival, and the rate of its sequence numbers."""
 
     first_received: float
     first_ns: int
@@ -264,7 +261,7 @@ class MessageCounter:
     gaps_ns: tuple[float, ...] = ()
 
     def heard(self, message: Message) -> None:
-        """Note a further message."""
+        """Note another message."""
         counted = message.sequence - self.last_sequence
         if counted > 0 and len(self.gaps_ns) < GAPS:
             self.gaps_ns += ((message.source_ns - self.last_ns) / counted,)
@@ -273,9 +270,8 @@ class MessageCounter:
     def began_before(self, time_ns: float, gaps: int = GAPS) -> bool | None:
         """Return whether its first message was sent before that time.
 
-        None: not sure by so many gaps.
-
-        A newcomer that is far from it is recognised by its second message.
+        None: uncertain by this many ``gaps``. A newcomer far from that time is recognised by its
+        second message.
         """
         if self.first_sequence in {1, UNCOUNTED}:
             return self.first_ns < time_ns
@@ -290,33 +286,34 @@ class MessageCounter:
 
 
 def _median(values: Sequence[float]) -> float:
-    """Return the median; the library's costs two megabytes in a process."""
+    """Return the median; importing the library's costs two megabytes per process."""
     ordered, half = sorted(values), len(values) // 2
     return ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2
 
 
 @dataclass(frozen=True, slots=True)
 class SenderMemory:
-    """What the next guard must know of a sender; ``nodes`` are those that it can be of."""
+    """State of a sender for the next guard."""
 
+    #: The candidates for its node.
     nodes: tuple[str, ...]
     sender: MessageCounter
 
 
 class Senders(Publishers):
-    """All publishers that were heard, or that the graph shows."""
+    """All publishers that sent messages, or that the graph shows."""
 
     def __init__(self, *, says_who: bool = True) -> None:
         super().__init__(says_who=says_who)
         self._heard: dict[bytes, MessageCounter] = {}
 
     def update(self, publishers: Sequence[Publisher]) -> None:
-        """Take who is in the graph now."""
+        """Take the publishers in the graph now."""
         super().update(publishers)
         forget_oldest(self._heard, self.present)
 
     def heard(self, message: Message, now: float) -> None:
-        """Count a message. Without ids messages cannot be counted."""
+        """Count a message. Messages without ids cannot be counted."""
         if message.gid is None:
             return
         sender = self._heard.get(message.gid)
@@ -327,19 +324,16 @@ class Senders(Publishers):
             self._heard[message.gid] = MessageCounter(now, *first, *first)
 
     def sender(self, gid: bytes | None) -> MessageCounter | None:
-        """Return what is known of that publisher's messages."""
+        """Return the counter of that publisher's messages."""
         return None if gid is None else self._heard.get(gid)
 
     def process(self, gid: bytes | None) -> str:
-        """Return the plan's process that the publisher is proven to be of, by its environment.
-
-        Empty: none is.
-        """
+        """Return the plan's process that the publisher's environment proves; empty: none."""
         publisher = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
         return publisher.process if publisher and publisher.ours else ""
 
     def is_ours(self, gid: bytes | None) -> bool | None:
-        """Return whether the publisher is of the guard's own run; None: that is not known."""
+        """Return whether the publisher belongs to the guard's own run; None: unknown."""
         publisher = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
         return publisher.ours if publisher else None
 
@@ -354,42 +348,36 @@ class Senders(Publishers):
         )
 
     def is_held_back(self, gid: bytes | None) -> bool | None:
-        """Whether what the publisher may not send reaches nobody in a strict plan.
-
-        None: that is not known.
-        """
+        """Return whether a strict plan blocks the publisher's foreign edges; None: unknown."""
         publisher = self.present.get(gid) if gid is not None else None
         return publisher.fenced if publisher else None
 
     def run(self, gid: bytes | None) -> OtherRun | None:
-        """Return the run of another robot that the publisher is of, by its environment.
-
-        None: no such is known.
-        """
+        """Return the other robot's run that the publisher's environment proves; None: none."""
         publisher = self.known.get(gid) if gid is not None else None
         return publisher.run if publisher else None
 
     def was_held_back(self, gid: bytes | None) -> bool:
-        """Return whether messages of one that may have left reached nobody, as far as known."""
+        """Return whether a publisher that may have left is known to have been blocked."""
         publisher = self.known.get(gid) if gid is not None else None
         return bool(publisher and publisher.fenced)
 
     @property
     def mark(self) -> tuple[int, int]:
-        """What changes when there is more to remember."""
+        """A value that changes when there is more to remember."""
         return len(self._heard), sum(
             publisher.node is not None for publisher in self.known.values()
         )
 
     def memory(self) -> dict[str, SenderMemory]:
-        """Return what the next guard must know of present publishers, by hexadecimal ids."""
+        """Return the state of present publishers for the next guard, by hexadecimal ids."""
         there = {gid: sender for gid, sender in self._heard.items() if gid in self.present}
         return {
             gid.hex(): SenderMemory(self.known[gid].nodes, since) for gid, since in there.items()
         }
 
     def recall(self, memory: dict[str, SenderMemory]) -> None:
-        """Know what the guard before knew."""
+        """Restore the previous guard's state."""
         for hexed, sender in memory.items():
             gid = bytes.fromhex(hexed)
             self._heard[gid] = sender.sender

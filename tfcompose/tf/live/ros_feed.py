@@ -37,8 +37,8 @@ ASK_AGAIN_S = 0.02
 class TreeListener:
     """Feeds an observer from a pair of TF topics (moving, fixed) while its node lives.
 
-    Where a simulator publishes /clock, stamps that are nearer to it than to the system's time are
-    compared with it.
+    If a simulator publishes /clock, stamps that are nearer to /clock than to system time are
+    compared with /clock.
     """
 
     def __init__(self, node: Node, observer: TreeObserver, topics: Topics) -> None:
@@ -113,7 +113,7 @@ class RosFeed:
     Args:
         name: the node's.
         observers: by topics.
-        joint_topics: topics of joint states of which it is observed who sends which joints.
+        joint_topics: topics of joint states whose senders and joints it observes.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class RosFeed:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give the observers who sent joint states, and end the node."""
+        """Pass the senders of joint states to the observers, and end the node."""
         sent = tuple(sent for joints in self._joints for sent in joints.sent_joints())
         for observer in self._observers.values():
             observer.sent_joints = sent
@@ -153,7 +153,7 @@ class RosFeed:
         return next((listener.clock_ns for listener in self.listeners), None)
 
     def take(self, timeout_s: float, stop: Stop) -> bool:
-        """Wait for messages, at most so long, and put what has come into the observers.
+        """Wait up to ``timeout_s`` seconds for messages, and pass them to the observers.
 
         Raises:
             RosError: if ROS cannot take messages.
@@ -167,7 +167,7 @@ class RosFeed:
         return True
 
     def elsewhere(self) -> tuple[str, ...]:
-        """Return the names of other topics on which there is TF."""
+        """Return the names of other topics with TF."""
         own = [topic for pair in self._observers for topic in pair]
         return tf_elsewhere(topics(self.node), own)
 
@@ -175,7 +175,7 @@ class RosFeed:
 def tf_elsewhere(
     topics: Iterable[tuple[str, Sequence[str]]], own: Iterable[str]
 ) -> tuple[str, ...]:
-    """Return the names of TF topics, of (name, types), not ours and not hidden (``/_…``)."""
+    """Return the names of TF topics, of (name, types), except ours and hidden ones (``/_…``)."""
     return tuple(
         name
         for name, types in topics

@@ -1,4 +1,4 @@
-"""The joints whose states somebody sends."""
+"""The joints that a publisher sends states of."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class SentJoints:
-    """The joints that a publisher of joint states sent on a topic.
-
-    ``node`` is its full name, empty while that is not known. ``first_ns`` and ``last_ns`` are when
-    its first and newest message came, in nanoseconds of the system's clock.
-    """
+    """The joints that a publisher of joint states sent on a topic."""
 
     topic: str
+    #: Its full name; empty: unknown so far.
     node: str
     joints: frozenset[str]
+    #: Arrival of its first message, in nanoseconds of the system clock.
     first_ns: int = 0
+    #: Arrival of its newest message, in nanoseconds of the system clock.
     last_ns: int = 0

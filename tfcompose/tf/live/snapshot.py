@@ -1,6 +1,7 @@
-"""Observes the running system for a while, and returns its state: what the doctor judges.
+"""Observation of the running system for a while; returns the state that the doctor judges.
 
-Besides TF that is what needs it: headers of sensor data, joint states, the robot's description.
+Besides TF it observes consumers of TF: headers of sensor data, joint states, and the robot
+description.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ MOST = 100
 
 
 class SensorTopics:
-    """Listens to what is below a namespace, for a while.
+    """Subscriptions to the topics below a namespace.
 
     ``moving_joints`` are those of the newest description.
     """
@@ -73,9 +74,9 @@ class SensorTopics:
         self.moving_joints: tuple[MovingJoint, ...] = ()
 
     def subscribe(self, graph: Iterable[TopicState], robots_inside: tuple[str, ...]) -> None:
-        """Listen to topics that are new.
+        """Subscribe to new topics.
 
-        Not to those of robots inside, which have TF topics of their own.
+        Except those of robots inside, which have their own TF topics.
         """
         for topic in graph:
             inside = topic.name.startswith(f"{self._prefix}/") and not topic.name.startswith(
@@ -97,7 +98,7 @@ class SensorTopics:
                 self._joints[topic.name] = JointStates(self._node, topic.name)
 
     def take(self, clock_ns: int | None) -> None:
-        """Take what has come; ``clock_ns`` is the newest simulated time or None."""
+        """Read pending messages; ``clock_ns`` is the newest simulated time or None."""
         for topic, subscription in self._headers.items():
             headers = subscription.take_headers() if subscription else []
             for frame, stamp_ns, received_ns in headers:
@@ -119,7 +120,7 @@ class SensorTopics:
             self.moving_joints = joints_of(text)
 
     def stamped_data(self) -> tuple[StampedData, ...]:
-        """Return what came with a header, by topic and frame."""
+        """Return the received messages with a header, by topic and frame."""
         return tuple(
             StampedData(
                 topic,
@@ -132,7 +133,7 @@ class SensorTopics:
         )
 
     def sent_joints(self) -> tuple[SentJoints, ...]:
-        """Return who sent joint states, and of which joints."""
+        """Return the senders of joint states, with their joints."""
         return tuple(sent for joints in self._joints.values() for sent in joints.sent_joints())
 
     def _end(self, subscription: HeaderSubscription) -> None:
@@ -144,7 +145,7 @@ MOVING = frozenset({"revolute", "continuous", "prismatic"})
 
 
 class _JointReader:
-    """Reads the joints of a URDF; a document that declares a type or entities is not read on."""
+    """Reads the joints of a URDF; stops at a document type or entity."""
 
     def __init__(self) -> None:
         self.joints: list[MovingJoint] = []
@@ -190,7 +191,7 @@ class _JointReader:
 
 
 def joints_of(description: str) -> tuple[MovingJoint, ...]:
-    """Return the moving joints of a URDF; none where it is none."""
+    """Return the moving joints of a URDF; empty if it is not one."""
     reader = _JointReader()
     reader.read(description)
     return tuple(reader.joints)
@@ -207,10 +208,9 @@ INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs
 
 
 def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) -> list[TreeState]:
-    """Observe the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
+    """Observe the topics (moving, fixed) for that many seconds, or until ``stop`` is requested.
 
-    Each pair of topics may have a plan that says what is expected on it; there is a state for each
-    pair.
+    Each pair of topics may have a plan with the expected edges. Return a state for each pair.
 
     Raises:
         RosError: if ROS cannot start a node, or take messages.
@@ -254,7 +254,7 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
 
 
 class _TopicPair:
-    """What is observed on one pair of topics, and below its namespace."""
+    """Observations on one pair of topics, and below its namespace."""
 
     def __init__(self, listener: TreeListener) -> None:
         self.listener = listener
@@ -266,7 +266,7 @@ class _TopicPair:
         self._taken_at = 0.0
 
     def take(self) -> None:
-        """Take what has come besides TF."""
+        """Read pending messages other than TF."""
         clock_ns, self._taken_at = self.listener.clock_ns, time.monotonic()
         if clock_ns != self._clock[0]:
             self._clock = (clock_ns, 0.0 if self._clock[0] is None else self._taken_at)
@@ -297,7 +297,7 @@ class _TopicPair:
 
 
 def _robot_nodes(plans: Iterable[Plan | None]) -> frozenset[str]:
-    """Return the nodes of the plans' processes but their guards, which look as tools do."""
+    """Return the nodes of the plans' processes, except guards, which look like tools."""
     return frozenset(
         node
         for plan in plans
@@ -315,7 +315,7 @@ def _is_tool(name: str, robot: frozenset[str]) -> bool:
 def topics_in(node: Node, robot: frozenset[str] = frozenset()) -> dict[str, TopicState]:
     """Return the topics that matter to TF with their endpoints, by name and type.
 
-    Those of tools are left out, but for nodes of the ``robot``.
+    Endpoints of tools are left out, except for nodes of the ``robot``.
     """
     found = {}
     for name, types in topics(node):
@@ -335,7 +335,7 @@ def topics_in(node: Node, robot: frozenset[str] = frozenset()) -> dict[str, Topi
 
 
 def _robots_inside(view: _TopicPair, graph: dict[str, TopicState]) -> tuple[str, ...]:
-    """Return the namespaces, below this one, of robots that have TF topics of their own."""
+    """Return the namespaces, below this one, of robots with their own TF topics."""
     names = {
         topic.name.removesuffix("/tf")
         for topic in graph.values()

@@ -1,4 +1,4 @@
-"""The state of a live tree, or of a recording: a small picture that verdicts are functions of."""
+"""State of a live tree or of a recording, as the input of verdicts."""
 
 from __future__ import annotations
 
@@ -34,27 +34,22 @@ class TopicState:
 
 @dataclass(frozen=True, slots=True)
 class StampedData:
-    """Messages with a header on a topic, of one frame.
-
-    ``delays_s`` are how old their stamps were when they came, in seconds of the clock that they
-    are nearest to; negative: ahead of it. ``stamp_ns`` is the newest message's stamp, and
-    ``received_ns`` when it came by the system's clock; None and 0 where that is not known.
-    """
+    """Messages with a header on a topic, of one frame."""
 
     topic: str
     frame: str
     nodes: tuple[str, ...]
+    #: Ages of the stamps at their arrival, in seconds of the nearest clock; negative: ahead of it.
     delays_s: tuple[float, ...]
+    #: The newest message's stamp; None: unknown.
     stamp_ns: int | None = None
+    #: The newest message's arrival by the system clock; 0: unknown.
     received_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class MovingJoint:
-    """A joint of the robot's description that moves.
-
-    A listener to joint states has to publish its edge.
-    """
+    """A moving joint of the robot description; a subscriber to joint states publishes its edge."""
 
     name: str
     parent: str
@@ -64,7 +59,7 @@ class MovingJoint:
 
 @dataclass(frozen=True, slots=True)
 class RosProcess:
-    """A process on this machine that has ROS loaded, and the settings that it was started with."""
+    """A process on this machine that has ROS loaded, and its initial settings."""
 
     pid: int
     command: str
@@ -73,65 +68,63 @@ class RosProcess:
 
 @dataclass(frozen=True, slots=True)
 class TreeState:
-    """What was observed in ``seconds`` on the topics (moving, fixed).
+    """Observations on a pair of TF topics."""
 
-    Attributes:
-        edges: each edge of each publisher.
-        publishers: who is on the two topics.
-        volatile_readers: the nodes that listen to the topic of fixed edges without asking for what
-            was sent before.
-        nodes: the full names of other nodes, of this robot or not.
-        graph: the topics, those of TF among them.
-        clock_ns: the newest time on /clock, None where nothing came.
-        clock_moves: whether that changed lately.
-        stamped: what came with a header.
-        moving_joints: the moving joints of the robot's description.
-        sent_joints: who sent joint states, and of which joints.
-        settings: the variables by which ROS is set up here.
-        processes: other processes of this machine with ROS, as far as they can be looked at.
-        skews_s: how far the clock of a publisher's machine is ahead of this one's, at least
-            (negative: or its messages are that long under way), by id.
-        malformed: how many messages came that are no TFMessage, by their publisher's id.
-        beyond: how many transforms came of edges that are not among ``edges``, because their
-            publisher sends too many, by its id.
-        sent: what each publisher sent on the topic of moving edges, by its id.
-        recorded: whether it is from a recording, which does not say who published.
-    """
-
+    #: Duration of the observation.
     seconds: float
+    #: The topics (moving, fixed).
     topics: tuple[str, str] = GLOBAL
+    #: Each edge of each publisher.
     edges: tuple[EdgeState, ...] = ()
+    #: The publishers on the two topics.
     publishers: tuple[Publisher, ...] = ()
+    #: Nodes that subscribe to fixed edges without requesting latched messages.
     volatile_readers: tuple[str, ...] = ()
+    #: Full names of other nodes, of this robot or not.
     nodes: tuple[str, ...] = ()
+    #: All topics, including those of TF.
     graph: tuple[TopicState, ...] = ()
+    #: The newest time on /clock; None: none came.
     clock_ns: int | None = None
+    #: True: that time changed recently.
     clock_moves: bool = False
+    #: Messages with a header.
     stamped: tuple[StampedData, ...] = ()
+    #: The moving joints of the robot description.
     moving_joints: tuple[MovingJoint, ...] = ()
+    #: The senders of joint states, with their joints.
     sent_joints: tuple[SentJoints, ...] = ()
+    #: The environment variables that set up ROS here.
     settings: Mapping[str, str] = field(default_factory=dict)
+    #: Other processes of this machine with ROS, as far as they can be inspected.
     processes: tuple[RosProcess, ...] = ()
+    #: Minimum lead of the clock of a publisher's machine over this one's, by id; negative: it
+    #: lags, or messages take that long.
     skews_s: Mapping[bytes, float] = field(default_factory=dict)
+    #: Number of messages that are not TFMessage, by publisher id.
     malformed: Mapping[bytes | None, int] = field(default_factory=dict)
+    #: Number of transforms of edges that are not kept, because their publisher sends too many, by
+    #: its id.
     beyond: Mapping[bytes | None, int] = field(default_factory=dict)
     plan: Plan | None = None
+    #: Traffic of each publisher on the topic of moving edges, by its id.
     sent: Mapping[bytes | None, Traffic] = field(default_factory=dict)
+    #: True: a recording, which does not identify publishers.
     recorded: bool = False
 
     @property
     def joint_names(self) -> frozenset[str]:
-        """The joints that joint states speak of."""
+        """The joints named in joint states."""
         return frozenset(joint for sent in self.sent_joints for joint in sent.joints)
 
     @property
     def taken(self) -> list[EdgeState]:
-        """The edges that tf2 takes, of each publisher."""
+        """The edges that tf2 accepts, of each publisher."""
         return [edge for edge in self.edges if edge.stream.is_taken]
 
     @property
     def moving(self) -> list[EdgeState]:
-        """Those of them that come on /tf."""
+        """The accepted edges that come on /tf."""
         return [edge for edge in self.taken if not edge.stream.static]
 
     @property
@@ -141,7 +134,7 @@ class TreeState:
 
     @property
     def rated(self) -> frozenset[str]:
-        """The frames whose rate a plan declares: they are judged by that."""
+        """The frames whose rate a plan declares; that rate is their limit."""
         return (
             frozenset(edge.child for edge in self.plan.edges if edge.rate)
             if self.plan
@@ -152,7 +145,7 @@ class TreeState:
     def simulated(self) -> bool:
         """Whether stamps should be of simulated time.
 
-        A plan says so, or most edges are nearer to /clock.
+        The plan says so, or most edges are nearer to /clock.
         """
         if self.plan and self.plan.ros.clock == "sim":
             return True
@@ -176,5 +169,5 @@ class TreeState:
 
 
 def who(edge: EdgeState) -> str:
-    """Return the publisher, as people read it."""
+    """Return the publisher for display."""
     return edge.publisher or NAMELESS

@@ -1,7 +1,4 @@
-"""The TF topics of the running system.
-
-What comes on them, and who publishes there, with the process of each.
-"""
+"""The TF topics of the running system: messages, publishers, and the process of each."""
 
 from __future__ import annotations
 
@@ -51,22 +48,21 @@ def id_of_topic(topic: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class TFData:
-    """A message as bytes, the kind of its topic, and whether it was sent behind a fence.
-
-    ``process`` is whose own topic it came on; empty: that is everybody's.
-    """
+    """A message as bytes, with its kind of topic."""
 
     received: Received
     static: bool
+    #: True: it came from an isolated process.
     fenced: bool = False
+    #: The process whose private topic it came on; empty: a public topic.
     process: str = ""
 
 
 class TFTopics:
-    """Messages on a pair of TF topics (moving, fixed), and behind a strict guard's fence.
+    """Messages on a pair of TF topics (moving, fixed), and from a strict plan's own processes.
 
-    With ``deep`` more messages are kept than a listener keeps. ``own`` are ids whose messages are
-    not taken. Call ``close`` before the node ends.
+    ``deep`` keeps more messages than a listener does. Messages with an id in ``own`` are skipped.
+    Call ``close`` before the node ends.
     """
 
     def __init__(
@@ -98,20 +94,20 @@ class TFTopics:
 
     @property
     def readers(self) -> list[MessageSource]:
-        """What is waited for."""
+        """The readers to wait for."""
         return [subscriber.reader for subscriber in (*self._fenced, *self._public)]
 
     def take(self) -> Iterator[TFData]:
-        """Yield what has come, but from oneself."""
+        """Yield pending messages, except one's own."""
         yield from self.take_fenced()
         yield from self.take_public()
 
     def take_fenced(self) -> Iterator[TFData]:
-        """Yield what has come behind the fence, but from oneself."""
+        """Yield pending messages of isolated processes, except one's own."""
         return self._take(self._fenced)
 
     def take_public(self) -> Iterator[TFData]:
-        """Yield what has come on everybody's topics, but from oneself."""
+        """Yield pending messages on public topics, except one's own."""
         return self._take(self._public)
 
     def close(self) -> None:
@@ -121,10 +117,10 @@ class TFTopics:
                 subscriber.reader.close()
 
     def _take(self, readable: Sequence[_Readable]) -> Iterator[TFData]:
-        """Yield what has come there.
+        """Yield pending messages of these readers.
 
-        What comes on a process's own topic is of that process, also where the rmw does not say
-        whose it is.
+        A message on a process's private topic is from that process, even if the rmw does not
+        identify the sender.
         """
         for subscriber in readable:
             for received in subscriber.reader.take():
@@ -137,7 +133,7 @@ class TFTopics:
 
 @dataclass(frozen=True, slots=True)
 class _Readable:
-    """A reader, and what holds for all that comes there, as in ``TFData``."""
+    """A reader, and the fields of ``TFData`` for all its messages."""
 
     reader: MessageSource
     static: bool
@@ -147,45 +143,39 @@ class _Readable:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Whose process a publisher is of; what is not known, or not proven, is None or empty.
+    """The process of a publisher; None or empty: unknown, or not proven."""
 
-    Attributes:
-        ours: whether it is of one's own run.
-        process: the plan's process that it is of.
-        fenced: whether it was started with its profile of the fence; None too where it is of
-            another run.
-        run: the run of another robot that it is of.
-        profile: the profile file that it was started with, where that is not the fence's.
-        unmarked: the number of the process, where it descends from the run's launcher, and its
-            environment says nothing of a run.
-    """
-
+    #: Whether it belongs to this run.
     ours: bool | None = None
+    #: The plan's process.
     process: str = ""
+    #: Whether it started with its profile of the plan; None also for another run.
     fenced: bool | None = None
+    #: The run of another robot that it belongs to.
     run: OtherRun | None = None
+    #: The profile file that it started with, if that is not the plan's.
     profile: str = ""
+    #: Process id of a descendant of the run's launcher whose environment names no run.
     unmarked: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class RunMarks:
-    """What the environments of runs say.
+    """Environment variables that identify runs and their processes."""
 
-    ``variable`` holds one's own ``run``, ``process`` the plan's process.
-
-    ``launcher`` holds a run's launcher: its process number, and when it began, in clock ticks
-    since the start of the machine. ``profile`` names the profile file that fences the process off;
-    empty: there is no such fence. ``components`` are the plan's processes that run inside of
-    another one, by its name and their nodes'. ``launcher_pid`` is one's own launcher.
-    """
-
+    #: The variable with the run's id.
     variable: str
+    #: This run's id.
     run: str
+    #: The variable with the plan's process.
     process: str
+    #: The variable with the profile file that isolates the process; empty: no profile does.
     profile: str = ""
+    #: The variable with a run's launcher: its process id, and its start in clock ticks since boot.
     launcher: str = ""
+    #: The plan's processes that run inside another one, by its name and their node.
     components: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    #: Process id of this run's launcher.
     launcher_pid: int = 0
 
     def process_of(self, known: Identity, node: str) -> str:
@@ -193,9 +183,9 @@ class RunMarks:
         return self.components.get((known.process, node), known.process)
 
     def identify(self, found: Sequence[Mapping[str, str]] | None) -> Identity:
-        """Return whose process it is of which one of these is the environment.
+        """Return the identity of a process with one of these environments.
 
-        None: nobody can say.
+        ``found`` is None if they are unreadable.
         """
         if found is None:
             return Identity()
@@ -214,7 +204,7 @@ class RunMarks:
         )
 
     def _other(self, environment: Mapping[str, str]) -> OtherRun | None:
-        """Return the run that this is the environment of, unless it is one's own."""
+        """Return the run that this environment belongs to, unless it is this one."""
         run, (pid, _, ticks) = (
             environment[self.variable],
             environment.get(self.launcher, "").partition(":"),
@@ -226,7 +216,7 @@ class RunMarks:
 
 
 class _Shown(NamedTuple):
-    """The publishers after so many changes of the graph."""
+    """The publishers as of a number of graph changes."""
 
     changes: int
     publishers: list[Publisher]
@@ -238,10 +228,10 @@ class TFGraph:
     The node's own are left out.
 
     Args:
-        node: the node that asks.
+        node: the node that queries.
         topics: the pair of topics.
-        private: the pairs of topics that processes are remapped to, where they are.
-        ours: what the environments of one's own run say; None: there is none.
+        private: the pairs of topics that processes are remapped to; None: they are not.
+        ours: environment variables that identify this run; None: there is no run.
     """
 
     def __init__(
@@ -267,7 +257,7 @@ class TFGraph:
         self._shown_globally: _Shown | None = None
 
     def hear_public(self, senders: Iterable[bytes]) -> None:
-        """Note who is heard outside of the fence, as every listener hears them."""
+        """Note senders whose messages bypass the filter, as every listener receives them."""
         newcomers = dict.fromkeys(senders).keys() - self._public.keys()
         if newcomers:
             self._public |= dict.fromkeys(newcomers)
@@ -276,7 +266,7 @@ class TFGraph:
     def publishers(self) -> list[Publisher]:
         """Return the current publishers on the topics and on remapped ones.
 
-        rmw is asked again when its graph has changed: of 200 publishers it takes 10 ms.
+        The rmw is queried only after its graph has changed: 200 publishers take 10 ms.
         """
         changes = self._changes.count()
         if self._shown is None or self._shown.changes != changes:
@@ -296,12 +286,10 @@ class TFGraph:
         return found
 
     def may_pass(self, gid: bytes) -> bool | None:
-        """Whether what the publisher sends behind the fence is of one's own run.
+        """Return whether an isolated message of this publisher is from this run.
 
-        None: it is not known yet.
-
-        In the common partition that must be seen; on a topic of a process's own, nobody else is
-        expected.
+        None: unknown so far. In the common partition that needs proof; on a process's private
+        topic, no other publisher is expected.
         """
         if gid not in self._ours:
             return None
@@ -311,7 +299,7 @@ class TFGraph:
         return known.ours is not False
 
     def where(self, gid: bytes) -> str:
-        """Return where the publisher runs, empty where that is not known."""
+        """Return where the publisher runs; empty if unknown."""
         return self._where.get(gid, "")
 
     def sends_clock(self) -> bool:
@@ -319,7 +307,7 @@ class TFGraph:
         return bool(writers(self._node, "/clock"))
 
     def global_publishers(self) -> list[Publisher]:
-        """Return who publishes on the global topics now, whatever the node's remappings are."""
+        """Return the current publishers on the global topics, ignoring the node's remappings."""
         changes = self._changes.count()
         if self._shown_globally is None or self._shown_globally.changes != changes:
             self._shown_globally = _Shown(changes, self._on(unmapped_writers, GLOBAL))
@@ -341,9 +329,9 @@ class TFGraph:
         ]
 
     def _is_own(self, publisher: GraphPublisher) -> bool:
-        """Whether a publisher is of this process.
+        """Return whether a publisher is of this process.
 
-        By its id, or on Zenoh, whose ids are hashes, by its node's name.
+        By its id, or on Zenoh, where ids are hashes, by its node's name.
         """
         if middleware() == IMPLEMENTATIONS["zenoh"]:
             return publisher.node == own_name(self._node)
@@ -409,14 +397,14 @@ class TFGraph:
         return known
 
     def _own_gid(self) -> bytes:
-        """Return an id of this process's: that of its reader."""
+        """Return an id of this process: that of its reader."""
         if not self._own:
             self._own = own_gid(self._node, self.topics[0])
         return self._own
 
 
 def _node_of(writer: GraphPublisher) -> str | None:
-    """Return the node's full name, None while it is not known; a writer of plain DDS has none."""
+    """Return the node's full name, None while unknown; a writer of plain DDS has none."""
     if writer.node.endswith(UNKNOWN_NODE):
         return None
     return NO_NODE if writer.node == BARE_DDS else writer.node

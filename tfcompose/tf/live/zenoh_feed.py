@@ -1,6 +1,6 @@
-"""Feeds observers from TF on Zenoh, where no ROS has rmw_zenoh.
+"""Feeds observers from TF on Zenoh, for machines whose ROS has no rmw_zenoh.
 
-Liveliness tokens name who sent what.
+Liveliness tokens name the sender of each message.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class _TopicFeed:
-    """Feeds an observer with what comes on a pair of TF topics (moving, fixed)."""
+    """Feeds an observer from a pair of TF topics (moving, fixed)."""
 
     def __init__(
         self, graph: ZenohGraph, data: ZenohTF, topics: Topics, observer: TreeObserver
@@ -39,7 +39,7 @@ class _TopicFeed:
         self._decoder = Decoder()
 
     def take(self, timeout_s: float) -> None:
-        """Wait for messages, at most so long, and put what has come into the observer."""
+        """Wait up to ``timeout_s`` seconds for messages, and pass them to the observer."""
         self._data.wait(timeout_s)
         observer = self._observer
         observer.observed_ns = time.time_ns()
@@ -75,7 +75,7 @@ def _publisher(token: TokenOfPublisher, *, static: bool) -> Publisher:
 
 
 class ZenohFeed:
-    """Feeds the observers of pairs of TF topics (moving, fixed) from a session of its own."""
+    """Feeds the observers of pairs of TF topics (moving, fixed) from its own session."""
 
     def __init__(self, observers: Mapping[Topics, TreeObserver]) -> None:
         self._observers = observers
@@ -104,12 +104,12 @@ class ZenohFeed:
         self._stack.close()
 
     def take(self, timeout_s: float, stop: Stop) -> bool:
-        """Wait for messages, at most so long, and put what has come into the observers."""
+        """Wait up to ``timeout_s`` seconds for messages, and pass them to the observers."""
         del stop  # it wakes nobody here
         for listener in self._listeners:
             listener.take(timeout_s / len(self._listeners))
         return True
 
     def elsewhere(self) -> tuple[str, ...]:
-        """Return no topics: those of others are not known."""
+        """Return no topics: other topics are unknown."""
         return ()

@@ -1,4 +1,4 @@
-"""The time to stamp with: the system's, or a simulator's as it comes on /clock."""
+"""Time for stamps: the system's, or a simulator's from /clock."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class SimClock:
     def now_ns(self) -> int | None:
         """Return the newest simulated time in nanoseconds, or None before the first.
 
-        What is no time is left out.
+        Skips messages that are not a time.
         """
         for received in self.subscription.take():
             read_ns = read_clock(received.data)
@@ -47,11 +47,10 @@ class SimClock:
 
 
 class StampClock:
-    """The time for a message that has none.
+    """Time for messages without a stamp: their arrival, or simulated time.
 
-    Its arrival, or simulated time, which is asked for only then.
-
-    ``say`` is given a line for people.
+    Subscribes to /clock only when the first such message arrives. ``say`` receives lines for the
+    user.
     """
 
     def __init__(self, node: Node, say: Callable[[str], None], *, sim: bool) -> None:
@@ -61,7 +60,7 @@ class StampClock:
         self.is_waiting = False
 
     def now_ns(self, received_ns: int) -> int | None:
-        """Return the time in ns for a message that arrived then, None while there is none."""
+        """Return the time in ns for a message that arrived then; None while there is none."""
         if not self._sim:
             return received_ns
         if self._clock is None:
@@ -70,7 +69,7 @@ class StampClock:
         return self._clock.now_ns()
 
     def check(self) -> None:
-        """Say after some seconds that the time does not come."""
+        """Report after some seconds that no time arrives."""
         if (
             self.is_waiting
             and self._clock
@@ -82,9 +81,9 @@ class StampClock:
 
 
 class ClockWatch:
-    """Looks for the first message on /clock, if the plan's time is simulated.
+    """Waits for the first message on /clock, if the plan's time is simulated.
 
-    ``check`` costs nothing afterwards.
+    Afterwards ``check`` costs nothing.
     """
 
     def __init__(self, node: Node, say: Callable[[str], None], *, sim: bool) -> None:
@@ -93,7 +92,7 @@ class ClockWatch:
         self._clock = SimClock(node) if sim else None
 
     def check(self) -> None:
-        """Say after some seconds that nothing has come, and who should have sent it."""
+        """Report after some seconds that none has come, and who should have sent it."""
         if self._clock is None or (self._clock.now_ns() is None and time.monotonic() < self._due):
             return
         if self._clock.now_ns() is None:
@@ -103,7 +102,7 @@ class ClockWatch:
 
 
 def no_clock(node: Node) -> str:
-    """Return the sentence that no simulated time has come, with who publishes it."""
+    """Return the sentence that no simulated time has come, and who publishes it."""
     names = publishing_nodes(node, "/clock")
     who = (
         f"{', '.join(names)} publishes it and has sent nothing" if names else "nobody publishes it"
@@ -112,7 +111,7 @@ def no_clock(node: Node) -> str:
 
 
 def read_clock(data: bytes) -> int | None:
-    """Return the time of a rosgraph_msgs/Clock in nanoseconds, or None if the bytes are none.
+    """Return the time of a rosgraph_msgs/Clock in nanoseconds, or None for other bytes.
 
     Layout (OMG CDR): four bytes of header, int32 seconds, uint32 nanoseconds.
     """
@@ -123,5 +122,5 @@ def read_clock(data: bytes) -> int | None:
 
 
 def wall_ns() -> int:
-    """Return the system's time in nanoseconds since the epoch, as nodes stamp without sim."""
+    """Return system time in nanoseconds since the epoch, as nodes without simulated time stamp."""
     return time.time_ns()

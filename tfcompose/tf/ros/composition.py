@@ -1,7 +1,7 @@
-"""The services of a container of components: load, unload and list, asked without waiting.
+"""The services of a component container: load, unload and list, called without blocking.
 
 Facts of rclcpp_components (ROS 2 Jazzy): a container carries out one request after the other, and
-answers a load when the component's constructor has returned. What it says of a failure is
+answers a load when the component's constructor has returned. It reports a failure in
 ``error_message``. Needs composition_interfaces, which comes with the containers.
 """
 
@@ -30,7 +30,7 @@ class Container:
         self.list = Service(node, ListNodes, f"{name}/{LIST}")
 
     def close(self) -> None:
-        """Take the clients away."""
+        """Destroy the clients."""
         for service in (self.load, self.unload, self.list):
             service.close()
 
@@ -38,7 +38,7 @@ class Container:
         """Send a request to load a component.
 
         Raises:
-            ValueError: if a parameter is of no kind that ROS has.
+            ValueError: if ROS has no parameter type for a value.
         """
         namespace, _, name = request.node.rpartition("/")
         component = request.component

@@ -1,7 +1,8 @@
-"""Environment of a process that speaks ROS: rclpy, and the variables that ROS reads at its start.
+"""Environment of a process that uses ROS: rclpy, and the variables that ROS reads at its start.
 
-Some settings make ROS end the process that starts a node, without a sentence: ``ros_trouble``
-finds them before. This module imports no ROS, so that everything can ask whether there is one.
+With some settings, ROS ends the process that starts a node, without a message. ``ros_trouble``
+finds these beforehand. This module imports no ROS, so that any module can ask whether ROS is
+installed.
 """
 
 from __future__ import annotations
@@ -41,14 +42,14 @@ LAST_DOMAIN = 232
 
 
 class RosError(Exception):
-    """Raised when ROS is there and cannot be used as needed.
+    """Raised when ROS is installed and cannot be used as needed.
 
     The message is one sentence for the user.
     """
 
 
 def missing_ros() -> str | None:
-    """Return None when rclpy can be imported, else one sentence that says what to install."""
+    """Return None if rclpy can be imported, else one sentence that says what to install."""
     if find_spec("rclpy") is not None:
         return None
     return (
@@ -59,11 +60,11 @@ def missing_ros() -> str | None:
 
 
 def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -> dict[str, str]:
-    """Return ``base`` with what the plan says about ROS.
+    """Return ``base`` with the plan's ROS settings.
 
-    What the plan leaves open stays as it is in ``base``. With ``own`` the process is one of
-    tfcompose's and announces itself by ``FASTDDS_PROFILE``, or the one for this machine alone,
-    unless ``base`` names a profile file already, or the middleware is not Fast DDS. Other
+    Settings that the plan leaves open stay as in ``base``. ``own``: the process is one of
+    tfcompose's, and uses the discovery profile ``FASTDDS_PROFILE``, or the one for this machine
+    alone, unless ``base`` already names a profile file or the middleware is not Fast DDS. Other
     processes keep their profile.
     """
     environment = {**base, "PYTHONUNBUFFERED": "1", **middleware_variables(ros, base)}
@@ -80,14 +81,14 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
 
 
 def is_fastdds(environment: Mapping[str, str]) -> bool:
-    """Return whether processes with this environment use Fast DDS, which is the default."""
+    """Return whether processes with this environment use Fast DDS, the default."""
     return (environment.get(RMW) or IMPLEMENTATIONS["fastdds"]).startswith("rmw_fastrtps")
 
 
 def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) -> Finding | None:
-    """Return what keeps a process with this environment from starting a node, or None.
+    """Return the finding that keeps a process from starting a node here, or None.
 
-    ``ros`` are the plan's words.
+    ``ros`` are the plan's settings.
     """
     named = environment.get(RMW, "")
     return (
@@ -99,7 +100,7 @@ def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) 
 
 
 def installed_distro(environment: Mapping[str, str]) -> str | None:
-    """Return the ROS release set up here, by its variable or rclpy: ``jazzy``; or None."""
+    """Return the ROS release set up here, from its variable or rclpy: ``jazzy``; or None."""
     if found := environment.get(DISTRO):
         return found
     for name in _RCLPY:
@@ -109,7 +110,7 @@ def installed_distro(environment: Mapping[str, str]) -> str | None:
 
 
 def other_distro(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
-    """Return a warning where another release of ROS is set up than the plan names, or None."""
+    """Return a warning if another release of ROS is set up than the plan names, or None."""
     here = installed_distro(environment)
     if ros.distro is None or here in {None, ros.distro}:
         return None
@@ -122,9 +123,9 @@ def other_distro(environment: Mapping[str, str], ros: RosSettings) -> Finding | 
 
 
 def reads_zenoh_alone(environment: Mapping[str, str]) -> bool:
-    """Return whether TF on Zenoh has to be read, and can be, without ROS.
+    """Return whether TF on Zenoh has to be, and can be, read without ROS.
 
-    By eclipse-zenoh, of the extra ``zenoh``.
+    It needs eclipse-zenoh, from the extra ``zenoh``.
     """
     wanted = (
         environment.get(RMW) == IMPLEMENTATIONS["zenoh"]
@@ -137,9 +138,9 @@ def reads_zenoh_alone(environment: Mapping[str, str]) -> bool:
 
 
 def other_middleware(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
-    """Return a warning where the environment names another middleware than the plan.
+    """Return a warning if the environment names another middleware than the plan, or None.
 
-    Tools see no process then.
+    Tools then do not see the robot's processes.
     """
     here, wanted = environment.get(RMW), IMPLEMENTATIONS[ros.rmw] if ros.rmw else None
     if not here or wanted in {None, here}:
@@ -154,7 +155,7 @@ def other_middleware(environment: Mapping[str, str], ros: RosSettings) -> Findin
 
 
 def no_ros() -> Finding | None:
-    """Return the finding that there is no ROS, with what to install, or None."""
+    """Return the finding that ROS is missing, with what to install, or None."""
     missing = missing_ros()
     if not missing:
         return None
@@ -163,7 +164,7 @@ def no_ros() -> Finding | None:
 
 
 def missing_composition() -> Finding | None:
-    """Return the finding that nothing can be loaded into containers here, or None."""
+    """Return the finding that containers cannot load components here, or None."""
     if find_spec("composition_interfaces") is not None:
         return None
     advice = (
@@ -192,7 +193,7 @@ def _domain(domain: str) -> Finding | None:
 def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
     """Look for the library as ROS does.
 
-    Where it is not, ROS ends the process as soon as it is imported.
+    Without it, ROS ends the process as soon as it is imported.
     """
     if not name:
         return None
@@ -229,12 +230,12 @@ def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
 
 
 def _release(ros: RosSettings | None) -> str:
-    """Return the release of ROS whose packages are named in advice."""
+    """Return the ROS release to name in package advice."""
     return (ros and ros.distro) or os.environ.get(DISTRO) or "jazzy"
 
 
 def _configuration(environment: Mapping[str, str]) -> Finding | None:
-    """Look for the files that Zenoh is configured by; without one, every session ends at once."""
+    """Check the files that configure Zenoh; if one is missing, every session ends at once."""
     for name in ZENOH_FILES if environment.get(RMW) == IMPLEMENTATIONS["zenoh"] else ():
         file = environment.get(name)
         if file and not Path(file).is_file():

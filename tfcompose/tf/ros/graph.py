@@ -1,11 +1,11 @@
 """Publishers and subscribers of the ROS graph, and the sender of each message.
 
-rmw says a publisher's id twice: with each message, and in the graph, where its node's name stands.
-With rmw_fastrtps the two are equal. With rmw_cyclonedds that which comes with a message is a
-number of the receiving process's own (rmw_cyclonedds#446), and tells senders apart without saying
-who they are. What a publisher of one's own has in messages is what ``rmw_get_gid_for_publisher``
-returns; by that every rmw can be asked which kind it is. Where rmw_zenoh's graph does not have the
-ids of messages, its liveliness tokens have them, which eclipse-zenoh reads.
+rmw gives a publisher's id twice: with each message, and in the graph, which also has its node's
+name. With rmw_fastrtps the two are equal. With rmw_cyclonedds the id of a message is a number
+private to the receiving process (rmw_cyclonedds#446): it distinguishes senders without identifying
+them. ``rmw_get_gid_for_publisher`` returns the message id of one's own publisher, so every rmw can
+be tested for its kind. If rmw_zenoh's graph lacks the ids of messages, its liveliness tokens have
+them, and eclipse-zenoh reads these.
 """
 
 from __future__ import annotations
@@ -67,26 +67,27 @@ _changes: WeakKeyDictionary[Context, GraphChanges] = WeakKeyDictionary()
 class GraphPublisher:
     """One publisher of a topic.
 
-    ``gid`` is its id, 16 bytes, and equals ``Received.gid`` of its messages. ``node`` is the full
-    name, such as ``/rover/static``; of an id that had a name once, that one. A publisher is
-    discovered before its node's name is: until then, and for good when it belongs to no ROS node,
-    ``node`` is ``UNKNOWN_NODE``, or ``BARE_DDS`` where rmw knows that, while id, type and QoS are
-    right. ``type`` reads like
-    ``tf2_msgs/msg/TFMessage``.
+    A publisher is discovered before its node's name is. Its id, type and QoS are right from the
+    start.
     """
 
+    #: Its id, 16 bytes, equal to ``Received.gid`` of its messages.
     gid: bytes
+    #: The full name, such as ``/rover/static``; the former one if it had a name once.
+    #: ``UNKNOWN_NODE`` until it is discovered, and for good if it belongs to no ROS node, or
+    #: ``BARE_DDS`` if rmw recognises that.
     node: str
     durability: Literal["volatile", "transient_local"]
     reliability: Literal["reliable", "best_effort"]
+    #: Such as ``tf2_msgs/msg/TFMessage``.
     type: str
 
 
 class GraphChanges:
     """Counts the changes of the graph that a node discovers.
 
-    rmw triggers one condition for all changes of a context, and a wait takes the trigger away: get
-    the one of a context by ``graph_changes``.
+    rmw triggers one condition for all changes of a context, and a wait resets the trigger. Get a
+    context's counter from ``graph_changes``.
     """
 
     def __init__(self, node: Node) -> None:
@@ -97,7 +98,7 @@ class GraphChanges:
         self._count = 0
 
     def count(self) -> int:
-        """Return how many times a change was found until now; it waits for nothing."""
+        """Return how many times a change was found so far, without blocking."""
         self._wait_set.clear_entities()
         if _tokens or self._add(self._wait_set.pointer, self._condition, None):
             self._count += 1  # nothing says whether it changed
@@ -108,7 +109,7 @@ class GraphChanges:
 
 
 def graph_changes(node: Node) -> GraphChanges:
-    """Return what counts the changes of the graph in the node's context."""
+    """Return the counter of graph changes in the node's context."""
     if node.context not in _changes:
         _changes[node.context] = GraphChanges(node)
     return _changes[node.context]
@@ -117,7 +118,7 @@ def graph_changes(node: Node) -> GraphChanges:
 def writers(node: Node, topic: str) -> list[GraphPublisher]:
     """Return the topic's publishers that ``node`` has discovered, sorted by node and id.
 
-    A relative ``topic`` is taken in the node's namespace, and the node's remappings are applied.
+    A relative ``topic`` is resolved in the node's namespace, and the node's remappings apply.
     """
     if _tokens:
         found = _tokens[0].publishers(node.resolve_topic_name(topic))
@@ -140,9 +141,9 @@ def publishing_nodes(node: Node, topic: str) -> list[str]:
 
 
 def unmapped_writers(node: Node, topic: str) -> list[GraphPublisher]:
-    """Return the same for exactly this absolute topic, whatever the node's remappings are.
+    """Return the publishers of exactly this absolute topic, whatever the node's remappings are.
 
-    It is asked for by its DDS name, ``rt/…``; an rmw without DDS shows nobody.
+    The query uses the DDS name, ``rt/…``; an rmw without DDS returns none.
     """
     return _sort_publishers(node.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True))
 
@@ -160,7 +161,7 @@ def volatile_readers(node: Node, topic: str) -> list[str]:
 
 
 def own_gid(node: Node, topic: str) -> bytes:
-    """Return the id of the node's own subscription, empty if the graph lacks it."""
+    """Return the id of the node's own subscription; empty if the graph lacks it."""
     infos = node.get_subscriptions_info_by_topic(topic)
     own = (
         info
@@ -183,7 +184,7 @@ def _writer(info: TopicEndpointInfo) -> GraphPublisher:
 
 
 def _name_of(info: TopicEndpointInfo) -> str:
-    """Return the full name of an endpoint's node, and remember it, or the one that it had."""
+    """Return the full name of an endpoint's node, and remember it; unnamed: the last one."""
     gid, name = bytes(info.endpoint_gid[:16]), _full_name(info.node_namespace, info.node_name)
     known = _names.pop(gid, name)
     if name in {UNKNOWN_NODE, BARE_DDS}:
@@ -218,9 +219,9 @@ _OF_EACH_NODE = frozenset(
 
 
 def is_offered(node: Node, service: str) -> bool:
-    """Return whether ``node`` has discovered a server of the service, and not only clients.
+    """Return whether ``node`` has discovered a server of the service, not only clients.
 
-    One whose process was killed stays known for many seconds, and does not count.
+    A server whose process was killed stays in the graph for many seconds, and does not count.
     """
     if not node.count_services(service):
         return False
@@ -246,7 +247,7 @@ def own_name(node: Node) -> str:
 
 
 def services(node: Node) -> list[str]:
-    """Return the full names of the services that are offered, but for those that each node has."""
+    """Return the full names of offered services, except those that every node has."""
     names = [
         name
         for name, _ in node.get_service_names_and_types()
@@ -261,11 +262,9 @@ def topics(node: Node) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
-    """Return who publishes on a topic, and who listens: node, type, and whether it publishes.
+    """Return the endpoints of a topic: node, type, and whether it publishes.
 
-    Unnamed ones left out.
-
-    ``topic`` is a full name; the node's own ends are left out.
+    ``topic`` is a full name. Endpoints without a node name and the node's own are left out.
     """
     own = own_name(node)
     infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
@@ -275,7 +274,7 @@ def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
 
 
 def nodes(node: Node) -> list[str]:
-    """Return the full names of the other nodes that ``node`` has discovered until now, sorted."""
+    """Return the full names of the other nodes that ``node`` has discovered, sorted."""
     own = own_name(node)
     names = {
         _full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()
@@ -296,7 +295,7 @@ class Allocator(ctypes.Structure):
 
 
 class _Gid(ctypes.Structure):
-    """rmw_gid_t, with 16 bytes of storage since Iron, and room behind it."""
+    """rmw_gid_t, with 16 bytes of storage since Iron, and spare room behind it."""
 
     _fields_ = (
         ("implementation", ctypes.c_char_p),
@@ -306,9 +305,9 @@ class _Gid(ctypes.Structure):
 
 
 def ids_say_who(node: Node) -> bool:
-    """Return whether the id of a message is that of its publisher in the graph.
+    """Return whether the id of a message equals that of its publisher in the graph.
 
-    Asked once for each rmw.
+    Tested once for each rmw.
     """
     rmw: str = get_rmw_implementation_identifier()
     if rmw.startswith("rmw_fastrtps"):
@@ -338,10 +337,7 @@ def _by_tokens(rmw: str) -> bool:
 
 
 def gid_of(publisher: Any) -> bytes:
-    """Return the id, 16 bytes, that comes with the messages of this publisher of one's own.
-
-    Empty where none does.
-    """
+    """Return the id, 16 bytes, in the messages of this publisher of one's own; empty: none."""
     library, gid = rcl(), _Gid()
     handle = library.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
     return (
@@ -364,9 +360,9 @@ def _ask(node: Node) -> bool:
 
 @cache
 def rcl() -> ctypes.CDLL:
-    """Return rcl, which rclpy has loaded, with what is called of it.
+    """Return librcl, which rclpy has loaded, with its functions declared.
 
-    Rmw's and rcutils' functions are found with it.
+    It also gives access to functions of rmw and rcutils.
 
     Raises:
         RosError: if the library cannot be opened.

@@ -1,11 +1,9 @@
-"""sensor_msgs/JointState as bytes.
-
-What is needed of it, read and written without ROS's typed messages.
+"""sensor_msgs/JointState as bytes, read and written in part, without ROS's typed messages.
 
 Layout (OMG CDR; sizes count from the end of the four bytes of header): int32 seconds, uint32
 nanoseconds, the frame as uint32 length, bytes and a NUL that the length counts; uint32 number of
 names, each written like the frame; uint32 number of positions, padding to a multiple of 8, the
-doubles; velocities and efforts in the same form. A length stands at a multiple of 4.
+doubles; velocities and efforts in the same form. Lengths are aligned to 4 bytes.
 """
 
 from __future__ import annotations
@@ -30,16 +28,12 @@ _DOUBLE = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointNames:
-    """The part of a message that stays while its sender does.
-
-    The frame and the names, as they were sent.
-
-    ``raw`` are the bytes behind the stamp up to the number of positions, ``order`` is struct's
-    sign of the byte order.
-    """
+    """The constant part of a sender's messages: the frame and the names, as sent."""
 
     names: tuple[str, ...]
+    #: The byte order, as struct's prefix.
     order: str
+    #: The bytes after the stamp, up to the number of positions.
     raw: bytes
 
     def fit(self, data: bytes) -> bool:
@@ -55,11 +49,11 @@ class JointNames:
         return int(seconds) * _SECOND_NS + int(nanoseconds)
 
     def positions_at(self, data: bytes) -> int:
-        """Return where the positions of a message that has these names begin, as doubles.
+        """Return the byte offset of the positions, as doubles, in a message with these names.
 
         Raises:
-            ValueError: with a sentence that is the same for the same fault, if it has another
-                number of positions.
+            ValueError: if it has another number of positions; the same fault has the same
+                sentence.
         """
         at = _FRAME_AT + len(self.raw)
         count = struct.unpack_from(f"{self.order}I", data, at)[0] if at + 4 <= len(data) else -1
@@ -80,7 +74,7 @@ def read_names(data: bytes) -> JointNames:
     """Return the names of a message. Work and memory are bounded by its length.
 
     Raises:
-        ValueError: with a sentence that is the same for the same fault, if it is no JointState.
+        ValueError: if it is not a JointState; the same fault has the same sentence.
     """
     if data[:2] not in (LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]) or len(data) < _FRAME_AT:
         raise ValueError("its bytes are not one")
@@ -101,7 +95,7 @@ def read_names(data: bytes) -> JointNames:
 def encode_names(names: Sequence[str]) -> bytearray:
     """Return a message with these names and positions of 0, little-endian.
 
-    ``fill`` gives it its values.
+    ``fill`` sets its values.
     """
     out = bytearray(LITTLE_ENDIAN + bytes(_FRAME_AT - _HEADER))
     out += struct.pack("<I", 1) + b"\0"
@@ -117,7 +111,7 @@ def encode_names(names: Sequence[str]) -> bytearray:
 
 
 def fill(message: bytearray, stamp_ns: int, positions: Sequence[float]) -> None:
-    """Give a message of ``encode_names`` its time and its positions (rad or m)."""
+    """Set the time in ns and the positions (rad or m) of a message from ``encode_names``."""
     struct.pack_into("<iI", message, _STAMP_AT, *divmod(stamp_ns, _SECOND_NS))
     struct.pack_into(
         f"<{len(positions)}d", message, len(message) - 8 - len(positions) * _DOUBLE, *positions

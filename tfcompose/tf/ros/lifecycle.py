@@ -1,7 +1,4 @@
-"""A lifecycle node of another process.
-
-Its state, asked for and, where that is wanted, changed, without waiting.
-"""
+"""A lifecycle node of another process: its state, queried and changed without blocking."""
 
 from __future__ import annotations
 
@@ -33,9 +30,9 @@ _NEXT = {
 
 
 class Lifecycle:
-    """One node, and the state in which it is to be.
+    """One node, and its target state.
 
-    Requests are sent and taken by hand: nothing spins here.
+    Requests are sent and answers read by hand: nothing spins here.
     """
 
     def __init__(self, node: Node, name: str, state: str, *, drive: bool) -> None:
@@ -52,7 +49,7 @@ class Lifecycle:
         self._fault = ""
 
     def close(self) -> None:
-        """Take the clients away."""
+        """Destroy the clients."""
         self._node.destroy_client(self._get)
         self._node.destroy_client(self._change)
 
@@ -62,11 +59,11 @@ class Lifecycle:
         return bool(self._state)
 
     def ask_again(self) -> None:
-        """Request the state again; a restarted node is driven again, a deactivated one not."""
+        """Request the state again; a restarted node is driven again, a deactivated one is not."""
         self._state, self._is_fresh = "", False
 
     def check(self, now: float) -> tuple[bool, str]:
-        """Take answers, ask on, and return whether the node is in its state."""
+        """Read answers, send requests, and return whether the node is in its state."""
         self._take(now)
         if self._pending is None and self._state != self._wanted and now >= self._not_before:
             self._ask(now)

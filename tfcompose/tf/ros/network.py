@@ -1,8 +1,7 @@
 """Detection of a network on this computer, and the wait for one.
 
-DDS reads a computer's addresses once, when a process joins. One that joins without a network, as
-at boot before Wi-Fi is there, or while a cable is out, is not heard on another computer, and hears
-nobody there, for good.
+DDS reads a computer's addresses once, when a process joins. A process that joins without a
+network, as at boot before Wi-Fi is up, or with an unplugged cable, never reaches other computers.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _REQUEST = struct.Struct("16sH22x")  # ifreq: a name, and flags
 
 
 def has_network() -> bool:
-    """Return whether an interface beside the loopback runs and has an address of IPv4."""
+    """Return whether an interface other than the loopback is up and has an IPv4 address."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         for _, name in socket.if_nameindex():
             request = _REQUEST.pack(name.encode(), 0)
@@ -43,9 +42,9 @@ def has_network() -> bool:
 
 
 class FirstNetwork:
-    """Requests ``stop`` once there is a network, where there is none as the block begins.
+    """Requests ``stop`` once there is a network, if there is none when the block begins.
 
-    ``came`` says that this was so. Where only this computer is heard, nothing is awaited.
+    ``came`` says that this happened. If ROS is limited to this computer, it waits for nothing.
     """
 
     def __init__(self, stop: Stop) -> None:

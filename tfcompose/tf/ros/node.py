@@ -1,10 +1,8 @@
-"""A node of tfcompose's own, and TF as bytes.
+"""tfcompose's own node, with TF as bytes: publish, receive with the sender's id, wait.
 
-Publish, take with the publisher's id, and wait without an executor.
-
-The node is cheap: it has no executor, parameters, services or signal handlers of rclpy's. rclpy on
-Jazzy does not say who published a message; rcl does (``rcl_take_serialized_message`` and rmw's
-``rmw_message_info_t``), and is called here with ctypes.
+The node is cheap: it has no executor, and no parameters, services or signal handlers of rclpy.
+rclpy on Jazzy does not say who published a message; rcl does (``rcl_take_serialized_message`` and
+rmw's ``rmw_message_info_t``), and is called here with ctypes.
 """
 
 from __future__ import annotations
@@ -68,9 +66,9 @@ def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy
 
 
 def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> QoSProfile:
-    """Return what is given, or the default.
+    """Return the given profile, or the default.
 
-    A depth alone leaves all else of the default, so that latched stays so.
+    A depth replaces only the default's depth, so that latched stays latched.
     """
     if isinstance(qos_or_depth, int):
         profile: Any = default
@@ -95,13 +93,12 @@ LATCHED = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 
 @contextmanager
 def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterator[Node]:
-    """Give a node in a context of its own, and end both with the ``with`` block.
+    """Give a node in its own context, and end both with the ``with`` block.
 
-    Leaving takes some milliseconds; a process that ROS does not let go is ended after ``LEAVE_S``.
-
-    It offers no parameters, no services and no /rosout, since nothing here would answer them.
-    ``args`` are what follows ``--ros-args``, for example ``["-r", "/tf:=tf"]``; the process's own
-    arguments are not looked at.
+    Leaving takes some milliseconds; if ROS does not return, the process is ended after
+    ``LEAVE_S``. The node offers no parameters, no services and no /rosout, since nothing here
+    would answer them. ``args`` are the arguments after ``--ros-args``, for example ``["-r",
+    "/tf:=tf"]``; the process's own arguments are ignored.
 
     Raises:
         RosError: if ROS refuses the name, the arguments or its environment.
@@ -125,12 +122,12 @@ def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterato
 
 @contextmanager
 def end_unless_done(seconds: float) -> Iterator[None]:
-    """End this process with code 1 if the block takes longer.
+    """End this process with code 1 if the block takes longer than ``seconds``.
 
-    Fast DDS 2.14 can wait for itself when several processes leave at once (one time in a hundred,
-    seen on Jazzy): the participant that goes waits, at full load, for a listener that handles a
-    publisher's going, and that listener waits for the participant. A thread of Python's could not
-    end it, because ROS keeps the interpreter's lock while it leaves; faulthandler's can.
+    Fast DDS 2.14 can deadlock when several processes leave at once (one time in a hundred, seen on
+    Jazzy): the leaving participant waits, at full load, for a listener that handles the departure
+    of a publisher, and that listener waits for the participant. A Python thread could not end the
+    process, because ROS holds the interpreter's lock while it leaves; faulthandler's thread can.
     """
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
@@ -153,7 +150,7 @@ def _node(context: Context, name: str, namespace: str) -> Any:
 
 
 def load_types() -> None:
-    """Load what messages of every own process are made with, as their first publisher would."""
+    """Load the message types of every own process, as their first publisher would."""
     tf_message_type()
     load: Any = check_for_type_support  # rclpy does not say the types of its arguments
     for message in (String, ParameterEvent):
@@ -174,7 +171,7 @@ def latch(node: Node, topic: str, text: str) -> Any:
 
 
 def parameter(node: Node, name: str, default: T) -> T:
-    """Return the value that ``-p name:=…`` among the node's arguments gives, or the default.
+    """Return the value of ``-p name:=…`` among the node's arguments, or the default.
 
     Raises:
         RosError: if the value has another type than the default.
@@ -219,20 +216,17 @@ class _MessageInfo(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A message as bytes, and how it came.
-
-    ``gid`` is its publisher's id, 16 bytes, as in ``graph.writers``, or None where the rmw does
-    not say it with a message (``identity``). ``raw_gid`` is what the rmw says instead: it tells
-    one's own publishers from others, and senders apart. Times are in nanoseconds of the system
-    clock; ``sequence`` counts the publisher's messages, or is the largest uint64 where the rmw
-    does not count.
-    """
+    """A message as bytes, and its origin. Times are in nanoseconds of the system clock."""
 
     data: bytes
+    #: Its publisher's id, 16 bytes, as in ``graph.writers``; None: the rmw does not identify
+    #: senders.
     gid: bytes | None
     source_ns: int
     received_ns: int
+    #: Count of the publisher's messages; the largest uint64 if the rmw does not count.
     sequence: int
+    #: The id as the rmw gives it: it distinguishes senders, and one's own publishers from others.
     raw_gid: bytes | None = None
 
 
@@ -257,16 +251,16 @@ class TFPublisher:
 
     @property
     def raw_gid(self) -> bytes:
-        """The id that its messages come with, as ``Received.raw_gid``."""
+        """The id in its messages, as in ``Received.raw_gid``."""
         return gid_of(self.publisher)
 
     def publish(self, data: bytes) -> None:
-        """Publish a message that ``tf_codec`` made."""
+        """Publish a message made by ``tf_codec``."""
         self.publisher.publish(data)
 
 
 class MessageSource(ABC):
-    """A source of a topic's messages as bytes, which ``wait`` waits for."""
+    """A source of a topic's messages as bytes, for use with ``wait``."""
 
     def __init__(self, topic: str, *, says_who: bool) -> None:
         self._topic, self._says_who = topic, says_who
@@ -281,9 +275,9 @@ class MessageSource(ABC):
         return self._topic
 
     def take(self) -> list[Received]:
-        """Return what has come since the last time, oldest first, and wait for nothing.
+        """Return the messages received since the last call, oldest first, without blocking.
 
-        At most ``DEEP`` messages, so that a flood does not keep the caller from its signals.
+        At most ``DEEP`` messages, so that a flood does not keep the caller from handling signals.
 
         Raises:
             RosError: if rcl cannot take from this subscription.
@@ -299,7 +293,7 @@ class MessageSource(ABC):
 
     @abstractmethod
     def add_to(self, wait_set: Any) -> tuple[str, int]:
-        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+        """Add it to rclpy's wait set; return the kind and index of its entity there."""
 
     def _receive(self) -> Received:
         info = self._info
@@ -315,7 +309,7 @@ class MessageSource(ABC):
 
 
 class Subscription(MessageSource):
-    """A subscription of any type, taken as bytes and never called back."""
+    """A subscription of any type, taken as bytes, without callbacks."""
 
     def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
         self.subscription: Any = node.create_subscription(
@@ -331,7 +325,7 @@ class Subscription(MessageSource):
         )
 
     def add_to(self, wait_set: Any) -> tuple[str, int]:
-        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+        """Add it to rclpy's wait set; return the kind and index of its entity there."""
         return "subscription", wait_set.add_subscription(self.subscription.handle)
 
     def _take_one(self) -> bool:
@@ -345,8 +339,8 @@ class Subscription(MessageSource):
 class TFSubscription(Subscription):
     """A subscription to /tf, /tf_static or ``topic`` with a tf2 listener's QoS.
 
-    With ``deep`` it keeps ten times as many messages as listeners do, for one that must miss
-    nobody: of a hundred latched publishers that it finds at once, or a flood.
+    ``deep`` keeps ten times as many messages as listeners do, for a subscriber that must miss no
+    publisher: among a hundred latched ones discovered at once, or in a flood.
     """
 
     def __init__(
@@ -392,16 +386,16 @@ class _Options(ctypes.Structure):
 
 
 class PublicTFReader(MessageSource):
-    """Reads a TF topic outside of all partitions, through a port of its own.
+    """Reads a TF topic outside all partitions, through its own port.
 
-    Profiles of readers go by the topic's name in ROS. This reader is of the same DDS topic under
-    no name of ROS's, made with rmw itself: rcl takes names only that begin with a slash. What is
-    sent to it has a port of its own, where that can be had: a flood there throws nothing out of
-    what waits at the process's port for its other readers. It keeps as much as a deep
+    Fast DDS selects profiles of readers by ROS topic name. This reader has the same DDS topic
+    without a ROS name. rmw creates it directly, because rcl accepts only names that begin with a
+    slash. It receives through its own port if possible, so that a flood there drops nothing of
+    what the process's other readers receive. It keeps as many messages as a deep
     ``TFSubscription``. Call ``close`` before the node ends.
 
     Raises:
-        RosError: if rmw makes no such reader, or does not say when something comes.
+        RosError: if rmw makes no such reader, or does not report arrivals.
     """
 
     def __init__(self, node: Node, topic: str, *, static: bool) -> None:
@@ -442,7 +436,7 @@ class PublicTFReader(MessageSource):
             raise RosError(f"rmw does not say when something comes on {topic}")
 
     def add_to(self, wait_set: Any) -> tuple[str, int]:
-        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+        """Add it to rclpy's wait set; return the kind and index of its entity there."""
         return "guard_condition", wait_set.add_guard_condition(self._came)
 
     def close(self) -> None:
@@ -460,7 +454,7 @@ class PublicTFReader(MessageSource):
 
 
 class WaitSet:
-    """Readers that are waited for again and again, until ``stop`` is requested."""
+    """Readers to wait for repeatedly, until ``stop`` is requested."""
 
     def __init__(self, node: Node, readers: Sequence[MessageSource], stop: Stop) -> None:
         self._readers, self._stop = tuple(readers), stop
@@ -468,10 +462,10 @@ class WaitSet:
         self._wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, self._context)
 
     def wait(self, timeout_s: float | None) -> list[MessageSource]:
-        """Wait until a reader has something, time is up (None: never) or ``stop``.
+        """Wait for a message, for ``timeout_s`` seconds (None: forever) or until ``stop``.
 
-        Return the readers that have something. A new publisher or reader in the graph ends no
-        wait. Nothing is taken.
+        Return the readers with messages. A new publisher or reader in the graph does not end the
+        wait. Takes no message.
         """
         if self._stop.requested:
             return []
@@ -497,17 +491,17 @@ def _topic(*, static: bool) -> str:
 
 
 def _ignore(_: object) -> None:
-    """Stand in for the callback that rclpy asks for."""
+    """Stand in for the callback that rclpy requires."""
 
 
 class TextSubscription(Subscription):
-    """A subscription to texts."""
+    """A subscription to std_msgs/String."""
 
     def __init__(self, node: Node, topic: str, qos: QoSProfile) -> None:
         super().__init__(node, String, topic, qos)
 
     def take_texts(self) -> list[tuple[Received, str]]:
-        """Return what has come since the last time, oldest first; what is no text is left out."""
+        """Return the texts received since the last call, oldest first; skip undecodable ones."""
         return [
             (received, text)
             for received in self.take()

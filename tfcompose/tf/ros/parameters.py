@@ -1,4 +1,4 @@
-"""Parameters of a node of another process, asked for without waiting."""
+"""Parameters of another process's node, queried without blocking."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ _FIELDS = {
 
 
 class ParameterReader:
-    """Some parameters of one node. Requests are sent and taken by hand: nothing spins here."""
+    """Some parameters of one node.
+
+    Requests are sent and answers read by hand: nothing spins here.
+    """
 
     def __init__(self, node: Node, name: str, parameters: Sequence[str]) -> None:
         self._node = node
@@ -37,16 +40,16 @@ class ParameterReader:
         self._requested_at = 0.0
 
     def close(self) -> None:
-        """Take the client away."""
+        """Destroy the client."""
         self._node.destroy_client(self._client)
 
     @property
     def is_there(self) -> bool:
-        """Whether the node answers questions about its parameters."""
+        """Whether the node offers its parameter service."""
         return bool(self._client.service_is_ready())
 
     def ask(self, now: float) -> None:
-        """Ask, unless an answer is waited for."""
+        """Send a request, unless an answer is pending."""
         if self._sequence is not None and now - self._requested_at < ANSWER_S:
             return
         request = GetParameters.Request(names=self._parameters)
@@ -56,10 +59,8 @@ class ParameterReader:
     def take(self) -> dict[str, Value | None] | None:
         """Return the values if the answer has come, else None.
 
-        A parameter that the node does not have is None.
-
-        One that is neither a truth value nor a number nor a text counts as one that it does not
-        have.
+        A parameter that the node does not declare is None, and so is one that is neither a bool
+        nor a number nor a string.
         """
         if self._sequence is None:
             return None

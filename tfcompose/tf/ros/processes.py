@@ -1,9 +1,9 @@
-"""Processes of this machine that have ROS loaded, and whose a publisher's id is.
+"""Processes of this machine that have ROS loaded, and the process behind a publisher's id.
 
 With Fast DDS an id begins with the vendor's number (01 0f), two bytes for the host, and the lower
 half of the process id (``GuidUtils``, Fast DDS 2.14). Two machines can have the same two bytes, so
-a process is named only where one fits. Of other users' processes, and other systems than Linux,
-nothing is known. This module imports no ROS.
+a process is named only if exactly one matches. Other users' processes, and systems other than
+Linux, cannot be inspected. This module imports no ROS.
 """
 
 from __future__ import annotations
@@ -47,16 +47,14 @@ def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
 
 
 def ros_variables(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return ROS's variables of an environment."""
+    """Return the ROS variables of an environment."""
     return {name: value for name, value in environment.items() if name.startswith(_PREFIXES)}
 
 
 def origin(gid: bytes, own_gid: bytes) -> str:
     """Return where a publisher runs: ``on this machine as pid 7: …``, ``on another machine``.
 
-    Empty if unknown.
-
-    ``own_gid`` is an id of this process's own.
+    Empty if unknown. ``own_gid`` is an id of this process.
     """
     if not _is_known(gid, own_gid):
         return ""
@@ -70,10 +68,10 @@ def origin(gid: bytes, own_gid: bytes) -> str:
 
 
 def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
-    """Return the initial environments of the processes that may be the publisher's.
+    """Return the initial environments of the processes that may own the publisher.
 
-    Several have the id's half of a process id, or none has, where it runs on another machine, or
-    has ended. None: nobody can say, because the id is another vendor's, or a process's environment
+    There are several if more processes match the id's half of a process id, and none if it runs on
+    another machine or has ended. None: unknown, because the id is another vendor's, or a process
     another user's.
     """
     if not _is_known(gid, own_gid):
@@ -87,9 +85,9 @@ def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
 
 
 def descent(gid: bytes, own_gid: bytes, ancestor: int) -> tuple[int, ...]:
-    """Return a publisher's process and those above it, up to the child of ``ancestor``.
+    """Return a publisher's process and its ancestors, up to the child of ``ancestor``.
 
-    Empty where it does not descend from that process, or is not known.
+    Empty if it does not descend from that process, or is unknown.
     """
     if not _is_known(gid, own_gid) or gid[2:4] != own_gid[2:4]:
         return ()
@@ -104,7 +102,7 @@ def descent(gid: bytes, own_gid: bytes, ancestor: int) -> tuple[int, ...]:
 
 
 def has_ended(gid: bytes, own_gid: bytes) -> bool:
-    """Return whether the process that an id is of ran on this machine, and has surely ended."""
+    """Return whether the process behind an id ran on this machine and has certainly ended."""
     is_here = _is_known(gid, own_gid) and gid[2:4] == own_gid[2:4]
     return is_here and not any(_command(pid) for pid in _candidates(gid))
 
@@ -119,13 +117,13 @@ def _is_known(gid: bytes, own_gid: bytes) -> bool:
 
 
 def _candidates(gid: bytes) -> range:
-    """Return the pids whose lower half is that of the id."""
+    """Return the process ids whose lower half matches the id."""
     most = procfs.kernel_number("kernel.pid_max") or _WORD
     return range(int.from_bytes(gid[4:6], "little"), most + 1, _WORD)
 
 
 def _environment(pid: int) -> dict[str, str]:
-    """Return the environment of a process; empty where it has just ended.
+    """Return the environment of a process; empty if it has just ended.
 
     Raises:
         PermissionError: if it is another user's.
@@ -139,7 +137,7 @@ def _environment(pid: int) -> dict[str, str]:
 
 
 def _parent(pid: int) -> int:
-    """Return the number of the process's parent, 0 where it has just ended."""
+    """Return the process's parent id; 0 if it has just ended."""
     try:
         return procfs.stat(pid).parent
     except OSError:
@@ -147,12 +145,12 @@ def _parent(pid: int) -> int:
 
 
 def _command(pid: int) -> str:
-    """Return the process's command line as it is shown, empty where there is none."""
+    """Return the process's command line for display; empty if there is none."""
     return _show_command(words_of(pid))
 
 
 def words_of(pid: int) -> list[str]:
-    """Return the words of a process's command line, none where they cannot be had."""
+    """Return the arguments of a process's command line; empty if they are unreadable."""
     try:
         return procfs.argv(pid)
     except OSError:

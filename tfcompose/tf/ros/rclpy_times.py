@@ -1,6 +1,6 @@
 """``rclpy.time`` and ``rclpy.duration``, which tf2_ros loads.
 
-So programs say ``rclpy.time.Time`` after ``import rclpy`` alone.
+Programs rely on that: they use ``rclpy.time.Time`` after ``import rclpy`` alone.
 """
 
 import rclpy.duration

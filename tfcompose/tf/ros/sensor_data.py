@@ -36,7 +36,7 @@ class JointStateSubscription(Subscription):
 
 
 class JointStatePublisher:
-    """Publishes the positions (rad or m) of the same joints again and again."""
+    """Publishes the positions (rad or m) of the same joints repeatedly."""
 
     def __init__(self, node: Node, names: Sequence[str], topic: str = JOINT_STATES_TOPIC) -> None:
         self._node = node
@@ -51,11 +51,11 @@ class JointStatePublisher:
 
     @property
     def gid(self) -> bytes:
-        """The id that comes with its messages."""
+        """The id in its messages."""
         return gid_of(self._publisher)
 
     def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
-        """Publish them, in the names' order, with this time in nanoseconds."""
+        """Publish the positions, in the names' order, stamped with this time in nanoseconds."""
         fill(self._message, stamp_ns, positions)
         self._publisher.publish(bytes(self._message))
 
@@ -93,9 +93,9 @@ class HeaderSubscription(Subscription):
         super().__init__(node, getattr(import_module(f"{package}.msg"), name), topic, _QOS)
 
     def take_headers(self) -> list[tuple[str, int, int]]:
-        """Return frame, stamp and time of arrival in nanoseconds of what has come.
+        """Return frame, stamp and arrival in nanoseconds of each received message.
 
-        What is no header is left out.
+        Skips messages without a header.
         """
         found = []
         for received in self.take():

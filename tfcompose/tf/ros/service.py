@@ -1,4 +1,4 @@
-"""A service of another process, asked without waiting, and parameters as messages."""
+"""A service of another process, called without blocking, and parameters as messages."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LISTS = {
 
 
 def parameter(name: str, value: Any) -> Any:
-    """Return a parameter as a message; whole numbers in a list with others are such numbers, too.
+    """Return a parameter as a message; integers in a list with floats become floats.
 
     Raises:
         ValueError: if ROS has no parameter of that kind.
@@ -47,7 +47,7 @@ def parameter(name: str, value: Any) -> Any:
 class Service:
     """One service of another process.
 
-    Its requests are sent and its answers taken by hand: nothing spins here.
+    Requests are sent and answers read by hand: nothing spins here.
     """
 
     def __init__(self, node: Node, kind: Any, name: str) -> None:
@@ -57,16 +57,16 @@ class Service:
         self._sequence: int | None = None
 
     def close(self) -> None:
-        """Take the client away."""
+        """Destroy the client."""
         self._node.destroy_client(self._client)
 
     @property
     def is_there(self) -> bool:
-        """Whether a node that runs offers it."""
+        """Whether a running node offers it."""
         return bool(self._client.service_is_ready()) and is_offered(self._node, self._name)
 
     def ask(self, **fields: Any) -> None:
-        """Send a request; an answer to the one before is not taken any more."""
+        """Send a request; the answer to the previous one is dropped."""
         request = self._client.srv_type.Request(**fields)
         with self._client.handle:
             self._sequence = self._client.handle.send_request(request)
@@ -95,13 +95,13 @@ class ParameterWriter:
         self._is_sent = False
 
     def close(self) -> None:
-        """Take the client away."""
+        """Destroy the client."""
         self._service.close()
 
     def refusal(self) -> str | None:
-        """Send the value once the node is there.
+        """Send the value once the node is present.
 
-        Return why the node refused it, empty if it took it, None while it has not answered.
+        Return why the node refused it; empty: it accepted; None: no answer yet.
         """
         if not self._is_sent and self._service.is_there:
             self._service.ask(parameters=[self._parameter])

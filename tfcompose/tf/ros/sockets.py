@@ -1,8 +1,8 @@
-"""The UDP sockets that this process receives through: how much they hold, and what they lost.
+"""The UDP sockets that this process receives through: buffer sizes and lost datagrams.
 
-A middleware opens them, and says neither. The kernel drops a datagram that comes while a socket
-is full: of publishers that send at the same moment it drops the last ones, and a reliable
-connection sends them again only with the writer's next heartbeat, 3 s later in Fast DDS.
+The middleware opens them, and reports neither. The kernel drops datagrams that arrive while a
+socket's buffer is full. If publishers send at the same moment, it drops the last ones, and a
+reliable connection repeats them only with the writer's next heartbeat, 3 s later in Fast DDS.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _INTERNET = (socket.AF_INET, socket.AF_INET6)
 
 
 def widen_buffers() -> None:
-    """Let each socket hold ``WANTED`` bytes, or as much as the kernel grants."""
+    """Let each socket buffer ``WANTED`` bytes, or as many as the kernel grants."""
     for udp_socket in _udp_sockets():
         with suppress(OSError):
             if udp_socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) < WANTED:
@@ -37,24 +37,24 @@ def widen_buffers() -> None:
 
 
 def buffer_limit() -> int | None:
-    """Return how many bytes the kernel grants a socket, None where it does not say."""
+    """Return how many bytes the kernel grants a socket; None: unknown."""
     return procfs.kernel_number(LIMIT)
 
 
 class LostDatagrams:
-    """Counts the datagrams that this process's sockets lost since it was made."""
+    """Counts the datagrams that this process's sockets have lost since its creation."""
 
     def __init__(self) -> None:
         self._known = _drops()
 
     def take(self) -> int:
-        """Return how many were lost since the last time."""
+        """Return how many were lost since the last call."""
         before, self._known = self._known, _drops()
         return sum(max(0, drops - before.get(inode, 0)) for inode, drops in self._known.items())
 
 
 def _drops() -> dict[int, int]:
-    """Return how many datagrams each socket lost, by its inode."""
+    """Return how many datagrams each socket lost, by inode."""
     found = {}
     for udp_socket in _udp_sockets():
         with suppress(OSError):  # a kernel that does not count
@@ -64,7 +64,7 @@ def _drops() -> dict[int, int]:
 
 
 def _udp_sockets() -> Iterator[socket.socket]:
-    """Yield this process's sockets of UDP, each as a copy that is open meanwhile."""
+    """Yield this process's UDP sockets, each as a duplicate that is open during the iteration."""
     for descriptor in procfs.descriptors():
         with suppress(OSError):  # closed meanwhile
             if not stat.S_ISSOCK(os.fstat(descriptor).st_mode):

@@ -1,4 +1,4 @@
-"""The action tf2_msgs/LookupTransform, by which a buffer server answers."""
+"""The action tf2_msgs/LookupTransform of a buffer server."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class LookupAction:
     """A client of a buffer server's action.
 
     Raises:
-        RosError: if there is no tf2_msgs.
+        RosError: if tf2_msgs is not installed.
     """
 
     def __init__(self, node: Node, name: str) -> None:
@@ -48,14 +48,14 @@ class LookupAction:
 
     @staticmethod
     def set_fixed_frame(goal: Any, fixed: str, target_ns: int) -> None:
-        """Let the goal ask for the target at another time, through a fixed frame."""
+        """Make the goal ask for the target at another time, through a fixed frame."""
         goal.fixed_frame, goal.advanced = fixed, True
         goal.target_time.sec, goal.target_time.nanosec = divmod(target_ns, _SECOND_NS)
 
     def result(self, goal: Any, timeout_s: float) -> Any:
-        """Return the server's result, or a string: why there is none in time.
+        """Return the server's result, or as a string why none came in time.
 
-        Somebody else spins the node.
+        Another thread must spin the node.
         """
         end = monotonic() + timeout_s
         if not self.client.server_is_ready():
@@ -73,7 +73,7 @@ class LookupAction:
 
 
 def _wait_until_done(future: Any, end: float) -> bool:
-    """Wait until the future is done; return False where the time is over before."""
+    """Wait until the future is done; return False if the time runs out first."""
     done = Event()
     future.add_done_callback(lambda _: done.set())
     return done.wait(max(0.0, end - monotonic()))

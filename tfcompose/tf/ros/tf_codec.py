@@ -5,9 +5,9 @@ int32 seconds, uint32 nanoseconds, the parent and the child as uint32 length, by
 the length counts, then padding to a multiple of 8 and seven doubles: x y z in metres, the
 quaternion x y z w. The next one starts at a multiple of 4.
 
-``encode`` and ``decode`` handle any message. What one publisher sends differs in stamps and poses
-only: a ``Template``, or with numpy an ``ArrayTemplate``, is such a message to be sent again and
-again, and a ``Decoder`` reads further messages of a known layout in a twentieth of the time.
+``encode`` and ``decode`` handle any message. A publisher's messages usually differ only in stamps
+and poses. A ``Template``, or with numpy an ``ArrayTemplate``, is such a message to send
+repeatedly, and a ``Decoder`` reads further messages of a known layout in a twentieth of the time.
 """
 
 from __future__ import annotations
@@ -63,14 +63,13 @@ LONGEST_NAME = 1024
 
 @dataclass(frozen=True, slots=True)
 class SentTransform:
-    """One transform of a TFMessage, as it was sent: nothing is normalised.
+    """One transform of a TFMessage, as it was sent: nothing is normalised."""
 
-    ``stamp_ns`` counts from the epoch.
-    """
-
+    #: In nanoseconds since the epoch.
     stamp_ns: int
     parent: str
     child: str
+    #: In metres.
     xyz: Vector
     quat_xyzw: Quaternion
 
@@ -79,10 +78,10 @@ class SentTransform:
 
 
 def encode(transforms: Sequence[SentTransform]) -> bytes:
-    """Return the transforms as one TFMessage, header included.
+    """Return the transforms as one TFMessage, including the header.
 
     Raises:
-        ValueError: if a name holds a NUL or a lone surrogate, or a stamp does not fit.
+        ValueError: if a name contains a NUL or a lone surrogate, or a stamp does not fit.
     """
     out = bytearray(LITTLE_ENDIAN + struct.pack("<I", len(transforms)))
     for transform in transforms:
@@ -94,11 +93,11 @@ def encode(transforms: Sequence[SentTransform]) -> bytes:
 
 
 class Template:
-    """A TFMessage whose names stay, while its time and its poses are set anew.
+    """A TFMessage with constant names, whose time and poses are set before each use.
 
-    Until they are set, the time is 0 and poses are the identity. All transforms have the same
-    time: what stands between two stamps is kept as one piece, and the message is the pieces joined
-    by the stamp.
+    Initially the time is 0 and poses are the identity. All transforms have the same time: the
+    bytes between two stamps are kept as one piece, and the message is the pieces joined by the
+    stamp.
     """
 
     def __init__(self, edges: Sequence[tuple[str, str]]) -> None:
@@ -115,11 +114,11 @@ class Template:
 
     @property
     def data(self) -> bytes:
-        """The message as it stands now."""
+        """The message with its current values."""
         return self._stamp.join([self._head, *self._bodies])
 
     def set_stamp(self, stamp_ns: int) -> None:
-        """Give every transform this time, in nanoseconds since the epoch.
+        """Set the time of every transform, in nanoseconds since the epoch.
 
         Raises:
             ValueError: if a message cannot hold it.
@@ -127,7 +126,7 @@ class Template:
         self._stamp = _stamp(stamp_ns)
 
     def set_pose(self, index: int, pose: Pose) -> None:
-        """Give the transform of that edge this pose of the child in the parent.
+        """Set the pose of the child in the parent of that transform.
 
         Raises:
             IndexError: if there is no such edge.
@@ -147,13 +146,11 @@ class Template:
 
 
 class ArrayTemplate:
-    """A TFMessage whose poses are written as numpy arrays.
+    """A TFMessage with constant names, whose poses are written as numpy arrays.
 
-    Names stay, and nothing is converted one by one.
-
-    All transforms have the same time. ``doubles`` are all of the message's places for a double;
-    ``xyz_at`` and ``quat_at``, of shapes (n, 3) and (n, 4), say which of them hold each
-    transform's translation (m) and its quaternion x y z w.
+    Nothing is converted one by one. All transforms have the same time. ``doubles`` are all places
+    for a double in the message; ``xyz_at`` and ``quat_at``, of shapes (n, 3) and (n, 4), are the
+    indices of each transform's translation (m) and its quaternion x y z w.
     """
 
     def __init__(self, edges: Sequence[tuple[str, str]], poses: Sequence[Pose]) -> None:
@@ -177,7 +174,7 @@ class ArrayTemplate:
         self.quat_at: NDArray[np.intp] = start + np.arange(3, 7)
 
     def data(self, stamp_ns: int) -> bytes:
-        """Return the message as it stands now, with this time in nanoseconds since the epoch.
+        """Return the message with its current poses and this time in nanoseconds since the epoch.
 
         Raises:
             ValueError: if a message cannot hold it.
@@ -187,7 +184,7 @@ class ArrayTemplate:
 
 
 def _body(at: int, parent: str, child: str) -> bytearray:
-    """Return what follows a stamp at byte ``at``, with identity in the last seven doubles."""
+    """Return the bytes after a stamp at byte ``at``, with identity in the last seven doubles."""
     out = bytearray()
     for name in (parent, child):
         out += bytes(_gap(at + len(out), 4))
@@ -221,12 +218,11 @@ def _gap(at: int, alignment: int) -> int:
 def decode(data: bytes) -> list[SentTransform]:
     """Return the transforms of a TFMessage, in order.
 
-    Either byte order is read, and bytes after the last are ignored.
-
-    Work and memory are bounded by the length of ``data``, whatever it claims to hold.
+    Either byte order is read, and bytes after the last are ignored. Work and memory are bounded by
+    the length of ``data``, whatever it claims to hold.
 
     Raises:
-        ValueError: with one sentence, if it is not one.
+        ValueError: with one sentence, if it is not a TFMessage.
     """
     return list(transforms(data))
 
@@ -235,7 +231,7 @@ def transforms(data: bytes) -> Iterator[SentTransform]:
     """Yield the transforms of a TFMessage as they are read, as ``decode`` returns them.
 
     Raises:
-        ValueError: with one sentence, where it is not one.
+        ValueError: with one sentence, if it is not a TFMessage.
     """
     reader = _MessageReader(data)
     for _ in range(reader.begin()):
@@ -243,9 +239,9 @@ def transforms(data: bytes) -> Iterator[SentTransform]:
 
 
 def number_of_transforms(data: bytes) -> int:
-    """Return how many transforms a message claims to hold, or how many fit into it.
+    """Return how many transforms a message claims to hold, at most as many as fit into it.
 
-    Nothing else is read.
+    Reads nothing else.
     """
     claimed = int.from_bytes(
         data[_HEADER : 2 * _HEADER], "big" if data[:2] == BIG_ENDIAN[:2] else "little"
@@ -254,12 +250,10 @@ def number_of_transforms(data: bytes) -> int:
 
 
 class MessageLayout:
-    """What does not change from one message of a publisher to the next.
+    """The constant part of a publisher's messages: the names, and the offsets of the numbers.
 
-    The names, and where the numbers are.
-
-    ``edges`` holds each transform's parent and child, in order, as they were sent. ``exact`` says
-    that these are all of the names' bytes.
+    ``edges`` holds each transform's parent and child, in order, as sent. ``exact``: these are all
+    bytes of the names.
     """
 
     __slots__ = ("_fixed", "_plain", "_rows", "_stamps", "edges", "exact")
@@ -285,7 +279,7 @@ class MessageLayout:
 
     @property
     def plain_edges(self) -> Edges:
-        """The edges as tf2 takes them, without a leading slash, and as they can be shown."""
+        """The edges as tf2 reads them, without a leading slash, and printable."""
         if self._plain is None:
             self._plain = tuple(
                 (plain_name(parent), plain_name(child)) for parent, child in self.edges
@@ -326,9 +320,9 @@ class MessageLayout:
 class Decoder:
     """Reads messages as ``decode`` does, twenty times faster for known layouts.
 
-    A later message of a known length and beginning is unpacked in one call; if the number of
-    transforms and all names, with their lengths, are then found where they were, it is laid out
-    the same, and its numbers are where they were too. Padding is not looked at.
+    A message of a known length and beginning is unpacked in one call. If the number of transforms
+    and all names, with their lengths, are then at the same offsets, it has the same layout, and
+    its numbers are at the same offsets too. Padding is ignored.
     """
 
     def __init__(self) -> None:
@@ -338,14 +332,14 @@ class Decoder:
         self.read_anew = 0
 
     def knows(self, data: bytes) -> bool:
-        """Return whether the message has a known layout, which is quick to read."""
+        """Return whether the message has a known layout, and so is fast to read."""
         return any(layout.stamps(data) is not None for layout in self._layouts.get(_key(data), ()))
 
     def rows(self, data: bytes) -> Iterable[Row]:
         """Return the transforms of a TFMessage, in order.
 
         Raises:
-            ValueError: with one sentence, if it is not one.
+            ValueError: with one sentence, if it is not a TFMessage.
         """
         key = _key(data)
         for layout in self._layouts.get(key, ()):
@@ -358,7 +352,7 @@ class Decoder:
         """Return a TFMessage's layout with its names, and its stamps in nanoseconds.
 
         Raises:
-            ValueError: with one sentence, if it is not one.
+            ValueError: with one sentence, if it is not a TFMessage.
         """
         key = _key(data)
         for layout in self._layouts.get(key, ()):
@@ -386,9 +380,9 @@ class Decoder:
 
 
 def _unpacking(data: bytes, pose: str) -> tuple[list[tuple[str, str]], struct.Struct]:
-    """Return a message's edges, and what unpacks it.
+    """Return a message's edges, and the struct that unpacks it.
 
-    Header, count, and of each transform stamp, names and ``pose``.
+    Header, count, and for each transform stamp, names and ``pose``.
     """
     reader = _MessageReader(data)
     edges: list[tuple[str, str]] = []
@@ -397,15 +391,12 @@ def _unpacking(data: bytes, pose: str) -> tuple[list[tuple[str, str]], struct.St
 
 
 def _as_taken(raw: bytes) -> str:
-    """Return a name as rclpy takes it: up to the first NUL, with U+FFFD for what is not UTF-8."""
+    """Return a name as rclpy reads it: up to the first NUL, with U+FFFD for invalid UTF-8."""
     return raw.partition(b"\0")[0].decode(errors="replace")
 
 
 def plain_name(frame: str) -> str:
-    """Return a frame's name as tf2 takes it, without a leading slash, and as it can be shown.
-
-    Printable, cut short.
-    """
+    """Return a frame's name as tf2 reads it, without a leading slash, printable and cut short."""
     name = frame.removeprefix("/")
     if not name.isprintable():
         name = visible(name)
@@ -413,10 +404,7 @@ def plain_name(frame: str) -> str:
 
 
 def _key(data: bytes) -> tuple[int, bytes, bytes]:
-    """Return what is different for most messages of different layout.
-
-    The length, and the first two names.
-    """
+    """Return a key that differs for most layouts: the length, and the first two names."""
     order: Order = "big" if data[:2] == BIG_ENDIAN[:2] else "little"
     parent = _raw_name(data, _FIRST_PARENT, order)
     at = _FIRST_PARENT + len(parent)
@@ -424,15 +412,15 @@ def _key(data: bytes) -> tuple[int, bytes, bytes]:
 
 
 def _raw_name(data: bytes, at: int, order: Order) -> bytes:
-    """Return a name with its length before it, as much as is there."""
+    """Return a name with its length before it, as far as the data go."""
     return data[at : at + 4 + int.from_bytes(data[at : at + 4], order)]
 
 
 class _MessageReader:
-    """Reads a message from its begin to its end.
+    """Reads a message from start to end.
 
     Raises:
-        ValueError: with one sentence, where it is none.
+        ValueError: with one sentence, if it is not a TFMessage.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -455,7 +443,7 @@ class _MessageReader:
         return count
 
     def skip(self, edges: list[tuple[str, str]]) -> str:
-        """Pass over a transform and note its parent and child.
+        """Skip a transform and record its parent and child.
 
         Return the struct format of its stamp and of its names, each with its length, up to the
         doubles.

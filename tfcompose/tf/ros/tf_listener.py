@@ -1,4 +1,4 @@
-"""Listening to TF in a node: one that the program spins, or one of its own with a thread."""
+"""Listening to TF in a node: one that the program spins, or a private one with a thread."""
 
 from __future__ import annotations
 
@@ -41,13 +41,11 @@ _numbers = count(1)
 
 
 class TransformTopic(NamedTuple):
-    """What is listened to: fixed edges or moving ones.
-
-    ``qos`` is rclpy's profile, a depth, or None for tf2's.
-    """
+    """A topic of fixed or of moving edges to listen to."""
 
     name: str
     static: bool
+    #: rclpy's profile, a depth, or None for tf2's.
     qos: Any
 
     @property
@@ -57,12 +55,10 @@ class TransformTopic(NamedTuple):
 
 
 class NodeListener:
-    """Subscriptions in a node that is handed over.
+    """Subscriptions in the caller's node.
 
-    Its executor calls ``on_message``, or ``poll`` does.
-
-    With ``spin`` an executor in a thread of its own spins the whole node, as tf2_ros's listener
-    does.
+    Its executor calls ``on_message``, or ``poll`` does. ``spin``: an executor in a separate thread
+    spins the whole node, as tf2_ros's listener does.
     """
 
     def __init__(
@@ -81,10 +77,7 @@ class NodeListener:
             self._thread.start()
 
     def poll(self) -> None:
-        """Take what has come and wait for nothing.
-
-        For a caller who keeps the executor from doing it.
-        """
+        """Take pending messages without blocking, for a caller that keeps the executor from it."""
         for subscription, static in self._subscriptions:
             with suppress(_rclpy.InvalidHandle), subscription.handle:
                 while (
@@ -120,7 +113,7 @@ class NodeListener:
 class ThreadListener:
     """A node in its own context, with a thread that calls ``on_message``.
 
-    With ``use_sim_time`` the node's clock follows /clock.
+    ``use_sim_time``: the node's clock follows /clock.
 
     Raises:
         RosError: if ROS cannot start a node.
@@ -166,7 +159,7 @@ class ThreadListener:
                     self._on_message(received.data, static)
 
     def _follow(self) -> None:
-        """Set the node's clock to simulated time, which notifies watchers of jumps."""
+        """Set the node's clock to simulated time, which notifies observers of jumps."""
         now_ns = self._clock.now_ns() if self._clock else None
         if now_ns is not None:
             clock: Any = self.node.get_clock()
@@ -176,11 +169,10 @@ class ThreadListener:
 
 
 def on_clock_jump(node: Node, callback: Callable[[], object]) -> Any:
-    """Call back when the node's clock goes back, or becomes a simulator's or the system's.
+    """Call back when the node's clock goes back, or switches between simulated and system time.
 
-    While the result lives.
-
-    The threshold is that of tf2_ros's ``Buffer`` in C++: any step back counts, and none forward.
+    Stops when the result is deleted. The threshold is that of tf2_ros's ``Buffer`` in C++: any
+    step back counts, and none forward.
     """
     log: Any = node
 
@@ -204,7 +196,7 @@ def on_clock_jump(node: Node, callback: Callable[[], object]) -> Any:
 def offer_frames(node: Node, text: Callable[[], str]) -> Any:
     """Offer the service ``tf2_frames``, which answers with the text.
 
-    Return it, or None where there is no tf2_msgs.
+    Return it, or None if tf2_msgs is not installed.
     """
     if find_spec("tf2_msgs") is None:
         return None

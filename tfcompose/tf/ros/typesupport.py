@@ -1,10 +1,8 @@
-"""The type of TFMessage for rclpy.
-
-The installed ``tf2_msgs``, or an own type support where there is none.
+"""The type of TFMessage for rclpy: the installed ``tf2_msgs``, or our own type support.
 
 PyPI has rclpy and geometry_msgs but no tf2_msgs, and a type support is normally compiled.
-tfcompose publishes and takes finished bytes only, and for that rclpy and rmw_fastrtps_cpp need no
-more than the type's name, shape, description and hash. All else is borrowed from
+tfcompose publishes and takes only serialised messages, and for that rclpy and rmw_fastrtps_cpp
+need no more than the type's name, shape, description and hash. All else is borrowed from
 ``geometry_msgs/TransformStamped``, at run time, with ctypes:
 
 - the type support of TFMessage is a ``rosidl_message_type_support_t`` that, asked for
@@ -16,10 +14,10 @@ more than the type's name, shape, description and hash. All else is borrowed fro
   TransformStamped's. The texts of the message files are TransformStamped's; no node of tfcompose
   serves them.
 
-rosidl's C structures stand first, as ctypes sees them. Sources: rosidl (Jazzy)
+The module begins with rosidl's C structures for ctypes. Sources: rosidl (Jazzy)
 ``message_type_support_struct.h``, ``type_hash.h``, ``type_description/*__struct.h`` and
 ``message_introspection.h``; rosidl_typesupport_fastrtps (Jazzy) ``message_type_support.h``. No
-compiler checks these layouts, so what is read is checked before use: names are where they are
+compiler checks these layouts, so all values are checked before use: names are where they are
 expected, and both types' hashes, computed from the descriptions (REP-2016), are the ones that ROS
 knows.
 """
@@ -134,13 +132,13 @@ class String(ctypes.Structure):
 
     @classmethod
     def of(cls, text: str) -> String:
-        """Return the string; it lives as long as what is returned."""
+        """Return the string; it lives as long as the returned object."""
         raw = text.encode()
         return cls(raw, len(raw), len(raw) + 1)
 
     @property
     def text(self) -> str:
-        """The string in Python; a ValueError if it is shorter or longer than it says."""
+        """The string in Python; a ValueError if its length is wrong."""
         raw: bytes = self.data or b""
         if len(raw) != self.size:
             raise ValueError("a string is shorter or longer than it says")
@@ -206,7 +204,7 @@ def tf_message_type() -> Any:
     Only its bytes can be published and taken.
 
     Raises:
-        RosError: if tf2_msgs is not installed and ROS is not as the own type support needs it.
+        RosError: if tf2_msgs is not installed and this ROS does not match our own type support.
     """
     if find_spec("tf2_msgs") is not None:
         # There is none with the wheels from PyPI.
@@ -219,7 +217,7 @@ def tf_message_type() -> Any:
 
 
 def own_type() -> Any:
-    """Return a class with an own type support, as ``tf_message_type`` does without tf2_msgs.
+    """Return a class with our own type support, as ``tf_message_type`` does without tf2_msgs.
 
     Raises:
         RosError: if the rmw is not rmw_fastrtps_cpp, or rosidl's structures are not the expected
@@ -368,7 +366,7 @@ def joint_state_type() -> Any:
 
 
 def _bytes_class(type_: str, attributes: dict[str, Any]) -> Any:
-    """Return a message class that rclpy takes, of which no message can be made."""
+    """Return a message class that rclpy accepts, but that cannot be instantiated."""
     # rclpy wants all five. The last four convert messages that are objects; they are no capsules,
     # so that a use raises.
     converters = (
@@ -398,7 +396,7 @@ def type_hash(description: dict[str, Any]) -> str:
 
 
 def description_json(type_support: int) -> dict[str, Any]:
-    """Return what the type support at that address says of its type, ready for ``type_hash``.
+    """Return the type description of the type support at that address, ready for ``type_hash``.
 
     Raises:
         ValueError: if there are no such structures at that address.
@@ -414,7 +412,7 @@ def description_json(type_support: int) -> dict[str, Any]:
 
 
 def hash_text(type_support: int) -> str:
-    """Return the hash that the type support at that address gives, in the form of REP-2016."""
+    """Return the hash of the type support at that address, in the form of REP-2016."""
     getter = Getter(TypeSupport.from_address(type_support).get_hash)
     found = Hash.from_address(getter(type_support))
     return f"RIHS{found.version:02}_{bytes(found.value).hex()}"
@@ -428,9 +426,9 @@ def capsule_address(capsule: object) -> int:
 
 
 def description_of(support: TypeSupport, address: int) -> TypeDescription:
-    """Return the description that a type support at that address gives.
+    """Return the description from a type support at that address.
 
-    A ValueError if it gives none.
+    A ValueError if it has none.
     """
     where = Getter(support.get_description)(address)
     if not where:

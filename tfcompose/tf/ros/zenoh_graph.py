@@ -2,13 +2,13 @@
 
 Facts of rmw_zenoh_cpp (docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp; the same in
 Jazzy, Kilted and Rolling). Every publisher declares the liveliness token
-``@ros2_lv/DOMAIN/SESSION/NODE_ID/ID/MP/ENCLAVE/NAMESPACE/NODE/TOPIC/TYPE/TYPE_HASH/QOS``, in whose
-parts ``%`` stands for a slash; ``MP`` is a publisher. Its id (gid) is the XXH3 hash of the token,
-128 bits, least significant byte first. It sends on the key ``DOMAIN/TOPIC/TYPE/TYPE_HASH`` with an
-attachment of 33 bytes: its count of messages and the time, int64 each, and the id with its length
-before it. Older releases wrote the name of each of the three before it. ``QOS`` is
-``RELIABILITY:DURABILITY:HISTORY,DEPTH:…`` in rmw's numbers; what is empty is the default, reliable
-and volatile.
+``@ros2_lv/DOMAIN/SESSION/NODE_ID/ID/MP/ENCLAVE/NAMESPACE/NODE/TOPIC/TYPE/TYPE_HASH/QOS``. In its
+parts ``%`` replaces a slash; ``MP`` means a publisher. The publisher's id (gid) is the XXH3 hash
+of the token, 128 bits, least significant byte first. It sends on the key
+``DOMAIN/TOPIC/TYPE/TYPE_HASH`` with an attachment of 33 bytes: its count of messages and the time,
+int64 each, and the id preceded by its length. Older releases wrote the name of each of the three
+before it. ``QOS`` is ``RELIABILITY:DURABILITY:HISTORY,DEPTH:…`` in rmw's numbers; an empty part
+means the default, reliable and volatile.
 
 Only robots on Zenoh need this module: it loads eclipse-zenoh and xxhash, of the extra ``zenoh``.
 """
@@ -57,13 +57,11 @@ _LATCHED = 100
 
 @dataclass(frozen=True, slots=True)
 class TokenOfPublisher:
-    """A publisher as its token says it.
+    """A publisher, as its token describes it. Names are as ROS writes them."""
 
-    ``gid`` is its id, 16 bytes; ``node`` its node's full name, ``topic`` and ``type`` as ROS
-    writes them.
-    """
-
+    #: Its id, 16 bytes.
     gid: bytes
+    #: Its node's full name.
     node: str
     topic: str
     type: str
@@ -73,9 +71,9 @@ class TokenOfPublisher:
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """What comes with a message.
+    """The attachment of a message: the publisher's count, the time sent, and the publisher's id.
 
-    The publisher's count, when it was sent, and the publisher's id, 16 bytes.
+    The id has 16 bytes.
     """
 
     sequence: int
@@ -85,7 +83,7 @@ class Attachment:
 
 @dataclass(frozen=True, slots=True)
 class ZenohMessage:
-    """A message of a TF topic as bytes; without an attachment nobody knows who sent it."""
+    """A message of a TF topic as bytes; without an attachment, its sender is unknown."""
 
     data: bytes
     static: bool
@@ -94,14 +92,14 @@ class ZenohMessage:
 
 
 def gid_of_token(token: str) -> bytes:
-    """Return the id of what declared the token, as it comes with its messages."""
+    """Return the id of the publisher that declared the token, as in its messages."""
     return xxhash.xxh3_128_intdigest(token.encode()).to_bytes(_GID_BYTES, "little")
 
 
 def publisher_of(token: str) -> TokenOfPublisher | None:
     """Return the publisher that declared the token.
 
-    None where it is of something else, or of no release known.
+    None if another entity or an unknown release declared it.
     """
     parts = token.split("/")
     if len(parts) < _PARTS or parts[0] != _SPACE or parts[5] != _PUBLISHER:
@@ -120,7 +118,7 @@ def publisher_of(token: str) -> TokenOfPublisher | None:
 
 
 def attachment_of(data: bytes) -> Attachment | None:
-    """Return what an attachment says, or None where it is not rmw_zenoh's."""
+    """Return the parsed attachment, or None if it is not rmw_zenoh's."""
     if len(data) == _ATTACHMENT.size:
         sequence, source_ns, length, gid = _ATTACHMENT.unpack(data)
         return Attachment(sequence, source_ns, gid) if length == _GID_BYTES else None
@@ -134,10 +132,9 @@ def attachment_of(data: bytes) -> Attachment | None:
 def open_session(environment: Mapping[str, str]) -> zenoh.Session:
     """Return a session that reaches the robot's router, as a client.
 
-    Close it, or Python does not end.
-
-    The environment's variables count as for rmw_zenoh's own sessions, but for the mode: a router
-    passes on to clients what peers send to each other.
+    Close it: Python does not exit while it is open. The environment's variables apply as for
+    rmw_zenoh's own sessions, except for the mode: a router forwards to clients what peers send to
+    each other.
 
     Raises:
         RosError: with one sentence, if there is no router, or no such configuration.
@@ -162,8 +159,8 @@ def open_session(environment: Mapping[str, str]) -> zenoh.Session:
 class ZenohGraph:
     """The publishers of a domain, as long as its session lives.
 
-    Tokens wait in a channel until somebody asks: a callback would have a thread of its own, which
-    Python waits for before it calls what ends the session.
+    Tokens wait in a channel until a query. A callback would have its own thread, and Python would
+    wait for that thread before it calls the function that ends the session.
     """
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
@@ -174,7 +171,7 @@ class ZenohGraph:
         )
 
     def publishers(self, topic: str) -> list[TokenOfPublisher]:
-        """Return who publishes on the topic now, by its full name, sorted by node and id."""
+        """Return the topic's current publishers, by its full name, sorted by node and id."""
         with self._lock:
             self._take()
             found = [
@@ -196,9 +193,9 @@ class ZenohGraph:
 
 
 class ZenohTF:
-    """Messages on a pair of TF topics (moving, fixed), each with who sent it.
+    """Messages on a pair of TF topics (moving, fixed), each with its sender.
 
-    Latched ones come at once.
+    Latched ones arrive at once.
     """
 
     def __init__(self, session: zenoh.Session, domain: int, topics: tuple[str, str]) -> None:
@@ -214,11 +211,11 @@ class ZenohTF:
         ]
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until something has come, at most so long."""
+        """Wait up to ``timeout_s`` seconds for a message."""
         self._came.wait(timeout_s)
 
     def take(self) -> list[ZenohMessage]:
-        """Return all that has come since the last time, oldest first."""
+        """Return the messages received since the last call, oldest first."""
         self._came.clear()
         found = []
         with suppress(IndexError):
@@ -252,10 +249,10 @@ class RobotGraph:
         self._graph = ZenohGraph(self._session, domain_of(os.environ))
 
     def publishers(self, topic: str) -> list[TokenOfPublisher]:
-        """Return who publishes on the topic now, sorted by node and id."""
+        """Return the topic's current publishers, sorted by node and id."""
         return self._graph.publishers(topic)
 
     def close(self) -> None:
-        """End the session, without which Python does not end."""
+        """End the session; Python does not exit while it is open."""
         self._graph.close()
         self._session.close()

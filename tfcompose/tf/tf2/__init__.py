@@ -16,17 +16,17 @@ numpy, and the listener needs rclpy. ::
     except TransformException as error:
         print(error)  # which edge is missing, or how many milliseconds too early or too late
 
-- ``buffer``: ``Buffer``, which waits; ``core``: ``BufferCore``, which takes and gives messages and
-  does not; both are ``pose_buffer``'s ``PoseBuffer``, numbers in and out
-- ``cache``, ``poses``, ``velocity``: what is kept of an edge, the way between two frames, and the
+- ``buffer``: ``Buffer``, which waits; ``core``: ``BufferCore``, which takes and gives messages
+  without waiting; both extend ``pose_buffer``'s ``PoseBuffer``, which has numbers in and out
+- ``cache``, ``poses``, ``velocity``: samples of an edge, the chain between two frames, and the
   arithmetic
-- ``messages``: times, TransformStamped, what tf2_geometry_msgs and tf2_sensor_msgs offer, and
-  types of your own
+- ``messages``: times, TransformStamped, the functions of tf2_geometry_msgs and
+  tf2_sensor_msgs, and your own types
 - ``arrays``: trajectories, points and clouds; ``transformations``: the functions of
   tf_transformations; need numpy
 - ``listener``, ``broadcasters``, ``buffer_client``: ``TransformListener``,
   ``TransformBroadcaster``, ``StaticTransformBroadcaster``, ``BufferClient``; need rclpy
-- ``exceptions``: why there is no transform, and why one was not taken
+- ``exceptions``: reasons for a missing or a rejected transform
 
 This package imports ``tfcompose.foundation.geometry`` and, for a listener or a node,
 ``tfcompose.tf.ros``; nothing else of tfcompose.

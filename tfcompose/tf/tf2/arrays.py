@@ -43,12 +43,11 @@ _FIELD_TYPES = {7: "f4", 8: "f8"}
 
 
 class Trajectory(NamedTuple):
-    """N poses of a frame in another.
+    """N poses of a frame in another."""
 
-    ``xyz`` N×3 in metres, ``quat_xyzw`` N×4, unit quaternions with w ≥ 0.
-    """
-
+    #: N×3, in metres.
     xyz: Floats
+    #: N×4, unit quaternions with w ≥ 0.
     quat_xyzw: Floats
 
     def matrices(self) -> Floats:
@@ -130,9 +129,9 @@ def _one_by_one(
 
 
 def _at_once(chain: PoseChain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
-    """Return the poses at those times, and which times all edges know.
+    """Return the poses at those times, and a mask of times that all edges know.
 
-    The poses at others mean nothing.
+    The poses at other times are undefined.
     """
     known = np.ones(len(stamps), bool)
     found = Trajectory(np.empty((len(stamps), 3)), np.empty((len(stamps), 4)))
@@ -151,16 +150,16 @@ def _at_once(chain: PoseChain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.b
 
 
 def _keep_memory(count: int) -> None:
-    """Free an array as large as all that one block needs, without ever touching it.
+    """Free an array as large as one block needs, without touching it.
 
-    After that the C library (glibc) keeps so much memory between the steps, which else goes back
-    to the system and is fetched again page by page; that took longer than the arithmetic.
+    After that the C library (glibc) keeps that much memory between the steps instead of returning
+    it to the system and fetching it again page by page, which took longer than the arithmetic.
     """
     np.empty((_ARRAYS, count))
 
 
 def _along(chain: PoseChain, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Any, ...]:
-    """Return the chain's poses at ascending times, and unset ``known`` where an edge has none."""
+    """Return the chain's poses at ascending times, and clear ``known`` where an edge has none."""
     pose: Any = None
     for cache, fixed, backwards in chain.links:
         link: Any = fixed if cache is None else _poses(cache, stamps, known)
@@ -185,7 +184,7 @@ def _of_unit_length(pose: tuple[Any, ...], count: int) -> Trajectory:
 def _poses(cache: TimeCache, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Floats, ...]:
     """Return the edge's poses at ascending times as seven arrays.
 
-    ``known`` is unset where there is none.
+    Clears ``known`` where there is none.
     """
     count = len(cache)
     at = np.array(cache.stamps)[-count:]
@@ -220,11 +219,11 @@ def _poses(cache: TimeCache, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[
 
 
 def _stretches(at: Stamps, samples: Floats) -> Floats:
-    """Return 17 rows with a column for each stretch.
+    """Return 17 rows with a column for each interval between samples.
 
-    Position at its begin, and the way to its end; quaternion at its begin, and the one at right
-    angles to it, in whose direction it turns the short way; by what angle; nanoseconds from the
-    first sample; 1 over its length.
+    Position at its start, and the displacement to its end; quaternion at its start, and the
+    orthogonal one towards which it turns the short way; the angle; nanoseconds from the first
+    sample; 1 over its length.
     """
     begin, end = samples[:, :-1], samples[:, 1:]
     dot = (begin[3:] * end[3:]).sum(axis=0)
@@ -241,9 +240,9 @@ def _stretches(at: Stamps, samples: Floats) -> Floats:
 
 
 def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
-    """Return sine and cosine, of small angles by a series that is three times faster.
+    """Return sine and cosine; for small angles by a series that is three times faster.
 
-    The first term that is left out is below the rounding of a double.
+    The first omitted term is below the rounding of a double.
     """
     if len(angles) == 0 or max(angles.max(), -angles.min()) > _SMALL:
         return np.sin(angles), np.cos(angles)
@@ -257,8 +256,8 @@ def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
 def transform_points_array(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
     """Return points in the parent's frame from points in the child's.
 
-    ``points`` has the shape (…, 3), in metres; the result has it too. float32 and float64 stay
-    what they are, other numbers become float64; what is computed is float64. NaN stays NaN.
+    ``points`` has the shape (…, 3), in metres, and so has the result. float32 and float64 keep
+    their type, other numbers become float64; the computation uses float64. NaN stays NaN.
 
     Raises:
         InvalidArgumentException: if the last dimension is not 3.
@@ -278,13 +277,13 @@ def transform_points_array(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
 
 
 def rotation_and_translation(pose: PoseTuple) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what takes rows of points along: ``rows @ turn + shift``; 3×3 and 3."""
+    """Return the matrix (3×3) and the vector that move rows of points: ``rows @ turn + shift``."""
     x, y, z, qx, qy, qz, qw = pose
     return np.array(matrix_from_quat((qx, qy, qz, qw))).T.copy(), np.array((x, y, z))
 
 
 def transform_cloud(cloud: Any, pose: PoseTuple) -> Any:
-    """Return a copy of the cloud with x, y and z moved; its header is the cloud's own.
+    """Return a copy of the cloud with x, y and z transformed; its header is unchanged.
 
     Raises:
         InvalidArgumentException: if there is no x, y or z of type float32 or float64, or too
@@ -312,7 +311,7 @@ def transform_cloud(cloud: Any, pose: PoseTuple) -> Any:
 
 
 def _column(cloud: Any, name: str, data: NDArray[np.uint8]) -> NDArray[Any]:
-    """Return the values of a field as an array of height × width that lies in ``data``."""
+    """Return the values of a field as an array of height × width, a view of ``data``."""
     field = next((each for each in cloud.fields if each.name == name), None)
     if field is None:
         there = ", ".join(each.name for each in cloud.fields) or "none"

@@ -2,16 +2,17 @@
 
 ``Buffer`` answers as tf2's does (geometry2 for ROS 2 Jazzy): a frame has one parent at a time,
 that of its newest sample; samples are kept for 10 s before the newest of their edge; between two
-samples positions go straight and rotations on the great circle; time 0 asks for the newest time
-that all moving edges have reached; fixed edges hold at any time. It differs on purpose in these:
+samples positions are interpolated linearly and rotations on the great circle; time 0 asks for the
+newest time that all moving edges have reached; fixed edges hold at any time. It differs on purpose
+in these:
 
-- what it raises says which edge is missing, or how many milliseconds too early or too late the
-  time is;
-- an infinite value is rejected like NaN, and a quaternion that is off unit length is rejected as
-  tf2's log says (Jazzy's ``BufferCore`` normalises before it looks, so that only a quaternion of
-  zeros is);
-- of the two quaternions for a rotation the one with w ≥ 0 comes back;
-- a chain of more than 1,000 edges is no loop.
+- its exceptions say which edge is missing, or how many milliseconds too early or too late the time
+  is;
+- an infinite value is rejected like NaN, and a quaternion off unit length is rejected as tf2's log
+  says (Jazzy's ``BufferCore`` normalises before it checks, so that it rejects only a quaternion of
+  zeros);
+- of the two quaternions for a rotation it returns the one with w ≥ 0;
+- a chain of more than 1,000 edges is not a loop.
 
 Times are integer nanoseconds throughout.
 """
@@ -50,13 +51,10 @@ _POLL_S = 0.005
 
 
 class BufferInterface:
-    """tf2_ros's ``BufferInterface``.
+    """tf2_ros's ``BufferInterface``: moves objects with a header, using a subclass's lookups.
 
-    Whoever can look a transform up can move objects that have a header.
-
-    A subclass defines the lookups. ``registration`` says what is done with which type. From the
-    start these messages are known: PointStamped, Vector3Stamped, PoseStamped,
-    PoseWithCovarianceStamped, PolygonStamped and PointCloud2, which needs numpy.
+    ``registration`` maps types to functions. It starts with PointStamped, Vector3Stamped,
+    PoseStamped, PoseWithCovarianceStamped, PolygonStamped and PointCloud2, which needs numpy.
     """
 
     def __init__(self) -> None:
@@ -69,12 +67,12 @@ class BufferInterface:
         timeout: Any = 0,
         new_type: type | None = None,
     ) -> Any:
-        """Return an object of the same type in another frame, at the time of its own stamp.
+        """Return an object of the same type, or as a ``new_type``, in another frame.
 
-        Or as a ``new_type``.
+        The time is that of its own stamp.
 
         Raises:
-            TypeException: if its type is not known, or nothing converts it into the new one.
+            TypeException: if its type is unknown, or no conversion to the new type is registered.
         """
         move = self.registration.get(type(object_stamped))
         header = object_stamped.header
@@ -159,16 +157,16 @@ class Buffer(BufferCore, BufferInterface):
 
     Args:
         cache_time: how long samples are kept, a duration; default 10 s.
-        node: an rclpy node; when its clock goes back, all moving edges are forgotten. (A listener
-            sees to that, too.) Where tf2_msgs is installed it offers the service ``tf2_frames``,
-            which view_frames asks.
+        node: an rclpy node; when its clock goes back, all moving edges are dropped. (A listener
+            does that, too.) If tf2_msgs is installed, it offers the service ``tf2_frames``, which
+            view_frames calls.
 
-    Lookups take and raise what ``BufferCore``'s do (module ``core``), and can wait for what is not
-    there yet.
+    Lookups take and raise the same as ``BufferCore``'s (module ``core``), and can wait for
+    transforms that have not arrived.
 
     A program that has loaded rclpy gets its ``Future``, for ``spin_until_future_complete`` and
-    coroutines that an executor runs; any other that of ``concurrent.futures``, and coroutines for
-    asyncio.
+    coroutines that an executor runs. Any other program gets that of ``concurrent.futures``, and
+    coroutines for asyncio.
     """
 
     def __init__(self, cache_time: Any = None, node: Any = None) -> None:
@@ -187,7 +185,7 @@ class Buffer(BufferCore, BufferInterface):
     # Transforms in.
 
     def follow_clock(self, node: Any) -> None:
-        """Forget moving edges whenever the node's clock jumps back or changes its source."""
+        """Drop moving edges whenever the node's clock jumps back or changes its source."""
         # Whoever has a node has ROS.
         from tfcompose.tf.ros.tf_listener import on_clock_jump  # noqa: PLC0415
 
@@ -196,7 +194,7 @@ class Buffer(BufferCore, BufferInterface):
             self._jumps[id(clock)] = (clock, on_clock_jump(node, self.time_jump_callback))
 
     def time_jump_callback(self, time_jump: object = None) -> None:
-        """Forget all samples of moving edges, since the clock went back."""
+        """Drop all samples of moving edges, because the clock went back."""
         self.clear()
 
     # Lookups.
@@ -207,7 +205,7 @@ class Buffer(BufferCore, BufferInterface):
         """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
 
         It takes coordinates in the source frame to the target frame. The stamp is the given time,
-        or what time 0 stands for. With a ``timeout`` it waits so long for the transform to come.
+        or the time that 0 resolves to. ``timeout`` is how long to wait for the transform.
         """
         time_ns = nanoseconds(time)
         if timeout == 0:
@@ -229,7 +227,7 @@ class Buffer(BufferCore, BufferInterface):
     ) -> Any:
         """Return the pose of the source frame at one time in the target frame at another.
 
-        Between the times ``fixed_frame`` is taken to stand still. The stamp is that of the target.
+        ``fixed_frame`` is assumed not to move between the times. The stamp is the target's time.
         """
         times = nanoseconds(target_time), nanoseconds(source_time)
         pose, stamp_ns = self._wait(
@@ -248,7 +246,7 @@ class Buffer(BufferCore, BufferInterface):
     ) -> Any:
         """Return whether ``lookup_transform`` would answer.
 
-        With ``return_debug_tuple`` also why not.
+        ``return_debug_tuple`` adds the reason.
         """
         time_ns = nanoseconds(time)
         error = self._error(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
@@ -266,7 +264,7 @@ class Buffer(BufferCore, BufferInterface):
     ) -> Any:
         """Return whether ``lookup_transform_full`` would answer.
 
-        With ``return_debug_tuple`` also why not.
+        ``return_debug_tuple`` adds the reason.
         """
         times = nanoseconds(target_time), nanoseconds(source_time)
         error = self._error(
@@ -278,7 +276,7 @@ class Buffer(BufferCore, BufferInterface):
     # Futures and coroutines.
 
     def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Any:
-        """Return a future of what ``lookup_transform`` returns."""
+        """Return a future with the result of ``lookup_transform``."""
         return self._future(lambda: self.lookup_transform(target_frame, source_frame, time))
 
     def wait_for_transform_full_async(
@@ -289,12 +287,12 @@ class Buffer(BufferCore, BufferInterface):
         source_time: Any,
         fixed_frame: str,
     ) -> Any:
-        """Return a future of what ``lookup_transform_full`` returns."""
+        """Return a future with the result of ``lookup_transform_full``."""
         query = target_frame, target_time, source_frame, source_time, fixed_frame
         return self._future(lambda: self.lookup_transform_full(*query))
 
     async def lookup_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Any:
-        """Wait until there is such a transform, and return it."""
+        """Wait until the transform is available, and return it."""
         return await _awaitable(self.wait_for_transform_async(target_frame, source_frame, time))
 
     async def lookup_transform_full_async(
@@ -305,7 +303,7 @@ class Buffer(BufferCore, BufferInterface):
         source_time: Any,
         fixed_frame: str,
     ) -> Any:
-        """Wait until there is such a transform, and return it."""
+        """Wait until the transform is available, and return it."""
         query = target_frame, target_time, source_frame, source_time, fixed_frame
         return await _awaitable(self.wait_for_transform_full_async(*query))
 
@@ -316,14 +314,12 @@ class Buffer(BufferCore, BufferInterface):
     ) -> NDArray[Any]:
         """Return points given in ``source`` in ``target``, at a time (0: the newest common one).
 
-        Needs numpy.
-
-        ``cloud`` is N×3, or of any shape (…, 3), in metres; so is the result. float32 stays
-        float32.
+        Needs numpy. ``cloud`` is N×3, or of any shape (…, 3), in metres; so is the result. float32
+        stays float32.
 
         Raises:
             InvalidArgumentException: if the last dimension is not 3.
-            ImportError: if there is no numpy.
+            ImportError: if numpy is not installed.
         """
         require_numpy()
         from tfcompose.tf.tf2.arrays import transform_points_array  # noqa: PLC0415 (numpy is optional)
@@ -340,13 +336,13 @@ class Buffer(BufferCore, BufferInterface):
     ) -> Trajectory:
         """Return the poses of ``source`` in ``target`` at many times at once. Needs numpy.
 
-        ``stamps`` are N integers, nanoseconds; 0 is the newest common time. What comes back is
-        (``xyz`` N×3 in metres, ``quat_xyzw`` N×4), and has ``matrices()`` (N×4×4): row by row what
-        ``lookup`` returns. For a time that an edge does not know, ``outside`` decides: raise
-        ``ExtrapolationException``, or give a row of NaN.
+        ``stamps`` are N integers, nanoseconds; 0 is the newest common time. The result (``xyz``
+        N×3 in metres, ``quat_xyzw`` N×4) has ``matrices()`` (N×4×4); each row is the result of
+        ``lookup``. For a time outside an edge's samples, ``outside`` decides: raise
+        ``ExtrapolationException``, or return a row of NaN.
 
         Raises:
-            ImportError: if there is no numpy.
+            ImportError: if numpy is not installed.
         """
         require_numpy()
         from tfcompose.tf.tf2.arrays import lookup_many  # noqa: PLC0415 (numpy is optional)
@@ -363,12 +359,10 @@ class Buffer(BufferCore, BufferInterface):
         return None
 
     def _wait(self, attempt: Callable[[], _Answer], timeout: Any) -> _Answer:
-        """Return the answer as soon as there is one.
+        """Return the answer as soon as there is one; on timeout raise the last exception.
 
-        Raise what it raised last when the time is over.
-
-        Where a listener has no thread of its own the caller may be the one who would take its
-        messages, so they are taken here.
+        If a listener has no thread, the waiting caller may be the one that spins its node, so this
+        takes the messages.
         """
         end_ns = monotonic_ns() + nanoseconds(timeout)
         while True:
@@ -388,11 +382,9 @@ class Buffer(BufferCore, BufferInterface):
                 poll()
 
     def _future(self, attempt: Callable[[], Any]) -> Any:
-        """Return a future that is done when the attempt succeeds.
+        """Return a future that completes when the attempt succeeds, now or after a new transform.
 
-        Now, or after something new was taken.
-
-        A frame's name that can never be one ends it with the exception.
+        An invalid frame name ends it with the exception.
         """
         if "rclpy.task" in sys.modules:
             future = sys.modules["rclpy.task"].Future()

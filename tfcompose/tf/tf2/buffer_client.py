@@ -29,17 +29,19 @@ _EXCEPTIONS = {
 
 
 class BufferClient(BufferInterface):
-    """Looks up by the action tf2_msgs/LookupTransform; the node must be spun elsewhere meanwhile.
+    """Looks up by the action tf2_msgs/LookupTransform.
+
+    Another thread must spin the node meanwhile.
 
     Args:
         node: an rclpy node.
         ns: the action's name.
-        check_frequency: taken for tf2's sake; an answer is there as soon as it has come.
+        check_frequency: ignored, exists for compatibility with tf2; an answer returns at once.
         timeout_padding: how much longer than a lookup's timeout its answer may take, a duration,
             or seconds as a float.
 
     Raises:
-        RosError: if there is no tf2_msgs.
+        RosError: if tf2_msgs is not installed.
     """
 
     def __init__(
@@ -120,7 +122,7 @@ class BufferClient(BufferInterface):
         return True
 
     def destroy(self) -> None:
-        """End the action's client; the node stays."""
+        """Destroy the action's client; the node stays."""
         self.action_client.destroy()
 
     def _answer(self, goal: Any, timeout: Any) -> Any:

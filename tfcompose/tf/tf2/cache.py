@@ -48,12 +48,12 @@ class TimeCache:
 
     A static frame has a single one, valid at any time.
 
-    ``parent`` is that of the newest sample, and empty where all samples were cleared; ``mixed``
-    says that samples have different parents. Of samples with the same stamp only the first and the
-    last that came are kept, since no answer depends on more; ``repeated`` has them all, by their
-    stamp, so that one that comes again is no other last one. Times and poses are kept as plain
-    numbers, seven for a pose, which takes a quarter of the memory of objects; those before the
-    index ``start`` have expired.
+    ``parent`` is that of the newest sample, and empty if all samples were cleared; ``mixed``:
+    samples have different parents. Of samples with the same stamp only the first and the last
+    received are kept, because no answer depends on the others. ``repeated`` has all of them, by
+    stamp, so that a duplicate does not replace the last one. Times and poses are plain numbers,
+    seven for a pose, which takes a quarter of the memory of objects. Those before the index
+    ``start`` have expired.
     """
 
     __slots__ = (
@@ -79,7 +79,7 @@ class TimeCache:
         return len(self.stamps) - self.start
 
     def clear(self) -> None:
-        """Forget all samples."""
+        """Drop all samples."""
         self.parent = ""
         self.mixed = False
         self.start = 0
@@ -99,12 +99,10 @@ class TimeCache:
         return self.stamps[-1]
 
     def append(self, stamp_ns: int, pose: bytes, cache_ns: int) -> bool:
-        """Take the next sample of a moving edge that has one parent, and return True.
+        """Add the next sample of a moving edge with a single parent, and return True.
 
-        Else do nothing.
-
-        ``pose`` is what ``pack_pose`` gives: an array takes it in a third of the time of seven
-        numbers.
+        Else do nothing. ``pose`` comes from ``pack_pose``: an array takes it in a third of the
+        time of seven numbers.
         """
         stamps = self.stamps
         if self.static or self.mixed or not stamps or stamp_ns <= stamps[-1]:
@@ -117,9 +115,9 @@ class TimeCache:
         return True
 
     def insert(self, stamp_ns: int, parent: str, pose: PoseTuple, cache_ns: int) -> Outcome:
-        """Take a sample, as tf2 does.
+        """Insert a sample, as tf2 does.
 
-        First drop what is older than ``cache_ns`` before the newest so far.
+        First drops samples older than ``cache_ns`` before the newest so far.
         """
         if self.static:
             return self._replace(stamp_ns, parent, pose)
@@ -155,8 +153,8 @@ class TimeCache:
     def pose_at(self, stamp_ns: int) -> PoseTuple | None:
         """Return the pose at that time (0: newest), interpolated between two samples.
 
-        Between samples of two parents the older holds. None: there is no sample before, or none
-        after.
+        Between samples of two parents, the older sample holds. None: there is no sample before, or
+        none after.
         """
         stamps = self.stamps
         if self.static or not stamp_ns:
@@ -175,7 +173,7 @@ class TimeCache:
         return between(self.poses[7 * index - 7 : 7 * index + 7], part)
 
     def parent_at(self, stamp_ns: int) -> str:
-        """Return the parent of the pose that ``at`` gives, or nothing where that is None."""
+        """Return the parent of the pose from ``pose_at``; empty if that is None."""
         if self.static or not stamp_ns:
             return self.parent
         stamps = self.stamps
@@ -213,7 +211,7 @@ class TimeCache:
         self.parents.insert(end, parent)
 
     def _of_several_parents(self) -> Outcome:
-        """Look again whether all samples have one parent, and which the newest has."""
+        """Check again whether all samples have one parent, and update the newest parent."""
         before = self.parent, self.mixed
         self.parent = self.parents[-1]
         self.mixed = any(
@@ -243,10 +241,10 @@ Link = tuple[None, PoseTuple, bool] | tuple["TimeCache", None, bool]
 
 
 class PoseChain:
-    """The pose of the source in the target as a product of links, from the source on.
+    """The pose of the source in the target as a product of links, starting at the source.
 
-    ``children`` are those of all edges. ``moving`` are the edges with samples over time. Where
-    there are none, ``fixed`` is the pose, else None.
+    ``children`` are those of all edges. ``moving`` are the edges with samples over time. If there
+    are none, ``fixed`` is the pose, else None.
     """
 
     __slots__ = ("children", "fixed", "links", "moving")
@@ -262,7 +260,7 @@ class PoseChain:
         )
 
     def pose_at(self, stamp_ns: int) -> PoseTuple | None:
-        """Return the source's pose in the target at that time, None if an edge has none."""
+        """Return the source's pose in the target at that time; None if an edge has none."""
         if self.fixed is not None:
             return self.fixed
         pose = None
@@ -279,7 +277,7 @@ class PoseChain:
     def common_ns(self) -> int:
         """Return the newest time that all moving edges have reached, in nanoseconds.
 
-        0 where none moves, as in tf2.
+        0 if none moves, as in tf2.
         """
         return min((cache.stamps[-1] for cache in self.moving if cache.stamps[-1]), default=0)
 
@@ -317,7 +315,7 @@ def chain_at(
 ) -> PoseChain:
     """Return the chain between two frames by each frame's parent at that time.
 
-    Where an edge has no pose at that time and might lead on, that is what is raised, as in tf2.
+    If an edge without a pose at that time might continue the chain, that is the error, as in tf2.
 
     Raises:
         LookupException: if the frames above one lead back to it.
@@ -341,7 +339,7 @@ def _meet(
 ) -> tuple[list[TimeCache], list[TimeCache], tuple[str, ...]]:
     """Return the edges from target and source to their common ancestor.
 
-    Where the ways do not meet, the frames are the two at which they end.
+    If the paths do not meet, the frames are the two at which they end.
     """
     down, top = _climb(caches, source, {target}, parent_of)
     if top == target:
@@ -379,7 +377,7 @@ def _climb(
 
 
 def outside(cache: TimeCache, stamp_ns: int) -> ExtrapolationException:
-    """Return the exception for a time outside of the edge's samples, which says how far."""
+    """Return the exception for a time outside the edge's samples; it says by how much."""
     if not len(cache):
         return ExtrapolationException(
             "Lookup would require extrapolation",
@@ -413,7 +411,7 @@ def outside(cache: TimeCache, stamp_ns: int) -> ExtrapolationException:
 
 
 def no_common_time(moving: Sequence[TimeCache]) -> ExtrapolationException:
-    """Return the exception for edges whose samples have no time in common, which it names."""
+    """Return the exception for edges whose samples have no common time; it names them."""
     behind = min(moving, key=lambda cache: cache.newest_ns)
     ahead = max(moving, key=lambda cache: cache.oldest_ns)
     gap = milliseconds(ahead.oldest_ns - behind.newest_ns)

@@ -1,10 +1,10 @@
-"""tf2_py's ``BufferCore``: a buffer that takes and gives messages, and waits for nothing.
+"""tf2_py's ``BufferCore``: a buffer that takes and gives messages, without waiting.
 
-Frames, times and durations are given as to tf2; see ``messages`` for what a time may be. All
+Frames, times and durations have the types that tf2 accepts; see ``messages`` for times. All
 lookups raise
 
 - ``InvalidArgumentException`` if a name is empty or starts with a slash,
-- ``LookupException`` if a frame is not known, or the frames above it lead back to it,
+- ``LookupException`` if a frame is unknown, or the frames above it lead back to it,
 - ``ConnectivityException`` if two frames are in two trees,
 - ``ExtrapolationException`` if an edge between them has no samples around that time.
 """
@@ -43,14 +43,14 @@ class BufferCore(PoseBuffer):
     # Transforms in.
 
     def set_transform(self, transform: Any, authority: str = "default_authority") -> None:
-        """Take a TransformStamped of a moving edge; what tf2 would reject is dropped.
+        """Take a TransformStamped of a moving edge; drop one that tf2 would reject.
 
-        ``set`` says whether it was.
+        ``set`` returns whether it was.
         """
         self.insert([_row(transform)], static=False, authority=authority)
 
     def set_transform_static(self, transform: Any, authority: str = "default_authority") -> None:
-        """Take a TransformStamped of a fixed edge; what tf2 would reject is dropped."""
+        """Take a TransformStamped of a fixed edge; drop one that tf2 would reject."""
         self.insert([_row(transform)], static=True, authority=authority)
 
     # Lookups.
@@ -59,7 +59,7 @@ class BufferCore(PoseBuffer):
         """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
 
         It takes coordinates in the source frame to the target frame. The stamp is the given time,
-        or what time 0 stands for.
+        or the time that 0 resolves to.
         """
         pose, stamp_ns = self._pose(target_frame, source_frame, nanoseconds(time))
         return transform_stamped(target_frame, source_frame, stamp_ns, pose)
@@ -74,7 +74,7 @@ class BufferCore(PoseBuffer):
     ) -> Any:
         """Return the pose of the source frame at one time in the target frame at another.
 
-        Between the times ``fixed_frame`` is taken to stand still. The stamp is that of the target.
+        ``fixed_frame`` is assumed not to move between the times. The stamp is the target's time.
         """
         target_ns, source_ns = nanoseconds(target_time), nanoseconds(source_time)
         pose, stamp_ns = self._full_pose(
@@ -103,7 +103,7 @@ class BufferCore(PoseBuffer):
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
         """Return the newest time that all moving edges between the two have reached.
 
-        0 where none moves.
+        0 if none moves.
         """
         with self._lock:
             if target_frame == source_frame:
@@ -123,15 +123,13 @@ class BufferCore(PoseBuffer):
         reference_point: Sequence[float] = (0.0, 0.0, 0.0),
         reference_point_frame: str = "",
     ) -> Velocity:
-        """Return how fast one frame moves as seen from another.
-
-        (``linear`` m/s, ``angular`` rad/s).
+        """Return the velocity of one frame seen from another (``linear`` m/s, ``angular`` rad/s).
 
         It is the mean over ``averaging_interval`` around a time (0: up to the newest), as far as
         samples go, with the axes of ``reference_frame``, default the observation frame. Linear is
-        the velocity of the tracking frame's origin, or of another point that moves along with it.
-        (tf2's ``lookupVelocity`` returns the same where nothing rotates and the axes agree; where
-        something rotates, it mixes up the axes.) What would begin before the epoch begins 10 µs
+        the velocity of the tracking frame's origin, or of another point that moves with it. (tf2's
+        ``lookupVelocity`` returns the same if nothing rotates and the axes agree; if something
+        rotates, it mixes up the axes.) An interval that would begin before the epoch begins 10 µs
         after it, as in tf2.
 
         Raises:
@@ -151,10 +149,7 @@ class BufferCore(PoseBuffer):
     def lookupVelocityCore(  # noqa: N802 (tf2_py's name)
         self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any
     ) -> Velocity:
-        """Return what ``lookup_velocity`` does.
-
-        But time 0 is the epoch here, as in tf2, and not the newest.
-        """
+        """Return the same as ``lookup_velocity``, but time 0 is the epoch, as in tf2."""
         return self._velocity(
             VelocityQuery(tracking_frame, observation_frame), nanoseconds(time), averaging_interval
         )
@@ -169,10 +164,7 @@ class BufferCore(PoseBuffer):
         time: Any,
         averaging_interval: Any,
     ) -> Velocity:
-        """Return what ``lookup_velocity`` does.
-
-        But time 0 is the epoch here, as in tf2, and not the newest.
-        """
+        """Return the same as ``lookup_velocity``, but time 0 is the epoch, as in tf2."""
         moving = VelocityQuery(
             tracking_frame,
             observation_frame,
@@ -216,11 +208,11 @@ class BufferCore(PoseBuffer):
         return f"digraph G {{\n{''.join(map(_dot, _edges(self.all_frames())))}}}"
 
     def _frameExists(self, frame_id: str) -> bool:  # noqa: N802 (tf2_py's name)
-        """Return whether the frame was heard of."""
+        """Return whether the frame is known."""
         return frame_id in self.frames
 
     def _getFrameStrings(self) -> list[str]:  # noqa: N802 (tf2_py's name)
-        """Return every frame that was heard of, in the order in which they were."""
+        """Return every known frame, in the order of their first appearance."""
         return [frame.name for frame in self.all_frames()]
 
     def _chain(
@@ -233,8 +225,7 @@ class BufferCore(PoseBuffer):
     ) -> list[str]:
         """Return the children of the edges from the source to the fixed frame and the target.
 
-        Where both times are the same, tf2 gives the way to the fixed frame alone, and so does
-        this.
+        If both times are equal, the path goes only to the fixed frame, as in tf2.
         """
         times = nanoseconds(source_time), nanoseconds(target_time)
         with self._lock:

@@ -1,10 +1,8 @@
-"""Why there is no transform, or why one was not taken.
+"""tf2's exceptions and rejections of transforms, and their messages.
 
-Tf2's exceptions and rejections, and what they say.
-
-The exceptions have tf2's names and hierarchy. Their messages begin as tf2's do, since programs
-look for those words; then they name the edge that is missing, or say by how many milliseconds a
-time is too early or too late. The source of the words is geometry2's buffer_core.cpp and cache.cpp
+The exceptions have tf2's names and hierarchy. Their messages begin like tf2's, because programs
+look for those words. Then they name the missing edge, or say by how many milliseconds a time is
+too early or too late. The source of the wording is geometry2's buffer_core.cpp and cache.cpp
 (Jazzy).
 """
 
@@ -30,8 +28,8 @@ class TransformException(Exception):
     """Raised when there is no pose of one frame in another.
 
     Args:
-        text: what tf2 says.
-        detail: what is known beyond that; tfcompose's commands print it alone.
+        text: tf2's message.
+        detail: further explanation; tfcompose's commands print it alone.
     """
 
     def __init__(self, text: str = "", detail: object = None) -> None:
@@ -49,7 +47,7 @@ class TransformException(Exception):
 
 
 class LookupException(TransformException):
-    """Raised when a frame is not known, or the frames above one lead back to it."""
+    """Raised when a frame is unknown, or the frames above one lead back to it."""
 
 
 class ConnectivityException(TransformException):
@@ -65,18 +63,18 @@ class InvalidArgumentException(TransformException):
 
 
 class TimeoutException(TransformException):
-    """Never raised here; it exists for programs that catch it."""
+    """Raised by ``BufferClient``; ``Buffer`` never raises it."""
 
 
 class TypeException(Exception):
     """Raised when a message of that type cannot be transformed.
 
-    As in tf2 it is no TransformException.
+    As in tf2 it is not a TransformException.
     """
 
 
 class NotImplementedException(Exception):
-    """Raised by a ``BufferInterface`` that does not look up."""
+    """Raised by a ``BufferInterface`` without lookups."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -85,7 +83,7 @@ class NotImplementedException(Exception):
 
 
 class Rejection(Enum):
-    """Why a transform was not taken; the values are the words of tf2's log."""
+    """The reason why a transform was rejected; the values are the words of tf2's log."""
 
     SELF = "TF_SELF_TRANSFORM"
     NO_CHILD = "TF_NO_CHILD_FRAME_ID"
@@ -111,9 +109,9 @@ _REJECTIONS = {
 
 
 def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
-    """Return why tf2 does not take a transform, whatever came before it.
+    """Return the first reason why tf2 rejects a transform, regardless of earlier ones.
 
-    The first reason that holds, as in tf2.
+    The order of reasons is tf2's.
     """
     if parent == child:
         return Rejection.SELF
@@ -133,10 +131,10 @@ def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
 
 
 class UnknownFrame:
-    """What is said of an unknown frame, with the nearest known name.
+    """Message for an unknown frame, with the nearest known name.
 
-    It is worked out when it is read: among thousands of names that takes longer than all lookups
-    of a second, and a program that waits for a frame asks for it with every message.
+    Computed only when it is read: with thousands of names that takes longer than all lookups of a
+    second, and a program that waits for a frame asks for it with every message.
     """
 
     __slots__ = ("_frame", "_known")
@@ -157,7 +155,7 @@ class UnknownFrame:
 
 
 def unknown_frame(frame: str, argument: str, known: Collection[str]) -> LookupException:
-    """Return the exception for a frame of which nothing was heard."""
+    """Return the exception for a frame that never appeared."""
     return LookupException(
         f'"{frame}" passed to lookupTransform argument {argument} does not exist',
         UnknownFrame(frame, known),
@@ -165,7 +163,7 @@ def unknown_frame(frame: str, argument: str, known: Collection[str]) -> LookupEx
 
 
 def unusable_name(frame: str, argument: str) -> InvalidArgumentException:
-    """Return the exception for a name that tf2 takes in no lookup."""
+    """Return the exception for a name that tf2 rejects in lookups."""
     text = f'Invalid argument "{frame}" passed to lookupTransform argument {argument}'
     if not frame:
         return InvalidArgumentException(f"{text} - in tf2 frame_ids cannot be empty")
@@ -177,7 +175,7 @@ def unusable_name(frame: str, argument: str) -> InvalidArgumentException:
 def connectivity_error(
     known: Collection[str], target: str, source: str, tops: Sequence[str]
 ) -> ConnectivityException:
-    """Return the exception for two frames whose ways up end at two ``tops``."""
+    """Return the exception for two frames whose ancestors end at two ``tops``."""
     return ConnectivityException(
         f"Could not find a connection between '{target}' and '{source}' because they are not part"
         " of the same tree",
@@ -202,7 +200,7 @@ def two_trees(known: Collection[str], a: str, b: str, top_a: str, top_b: str) ->
 def loop(frame: str, children: Sequence[str]) -> LookupException:
     """Return the exception for the loop that begins and ends at ``frame``.
 
-    ``children`` are the frames on the way up.
+    ``children`` are the frames along its parents.
     """
     around = children[children.index(frame) :]
     return LookupException(

@@ -1,4 +1,4 @@
-"""tf2_ros's ``TransformListener``: fills a buffer with what comes on /tf and /tf_static.
+"""tf2_ros's ``TransformListener``: fills a buffer from /tf and /tf_static.
 
 It needs rclpy.
 """
@@ -18,29 +18,29 @@ _MOST_WARNINGS = 200
 
 
 class TransformListener:
-    """Subscribes to TF and puts it into a buffer, until it is closed.
+    """Subscribes to TF and fills a buffer, until it is closed.
 
     Args:
-        buffer: what is filled.
-        node: an rclpy node; whoever spins it feeds the buffer. None: a node of its own with a
-            thread of its own.
-        spin_thread: spin the node that was handed over in a thread of the listener's.
+        buffer: the buffer to fill.
+        node: an rclpy node; spinning it feeds the buffer. None: the listener makes a node with a
+            thread.
+        spin_thread: spin the given node in a thread of the listener.
         qos: an rclpy QoSProfile or a depth for /tf; default tf2's: reliable, volatile, the last
             100.
         static_qos: the same for /tf_static; default tf2's: reliable, transient local, the last
             100.
         tf_topic: the topic of moving edges.
         tf_static_topic: the topic of fixed edges.
-        static_only: listen to fixed edges alone.
+        static_only: listen only to fixed edges.
         namespace: listen to /NAMESPACE/tf and /NAMESPACE/tf_static instead.
-        use_sim_time: the listener's own node follows /clock; a node that is handed over has its
-            own parameter.
+        use_sim_time: the listener's own node follows /clock; a given node has its own parameter.
 
-    When a node's clock goes back, as a simulator's or a bag's does, the buffer forgets all moving
-    edges, and the node's log says so. What is rejected is logged once for each frame and reason.
+    When a node's clock goes back, as a simulator's or a bag's does, the buffer drops all moving
+    edges, and the node's log says so. Rejected transforms are logged once for each frame and
+    reason.
 
     Raises:
-        RosError: if rclpy is not there or cannot be used.
+        RosError: if rclpy is not installed or cannot be used.
     """
 
     def __init__(  # noqa: PLR0913 (tf2's arguments, and three)
@@ -94,7 +94,7 @@ class TransformListener:
     def close(self) -> None:
         """End the subscriptions, and the listener's own thread and node.
 
-        The buffer keeps what it has.
+        The buffer keeps its content.
         """
         poll = getattr(self._ros, "poll", None)
         if poll in self.buffer.pollers:

@@ -1,16 +1,14 @@
-"""Messages in and out of a buffer.
+"""Messages in and out of a buffer: times, TransformStamped, and transforms of other messages.
 
-Times, TransformStamped, and what moves other messages to another frame.
-
-A program that has loaded ROS's geometry_msgs gets its ``TransformStamped``, which it may publish;
-any other gets the classes of this module, which have the same fields. Times are what has
-``nanoseconds`` (rclpy's ``Time`` and ``Duration``) or ``sec`` and ``nanosec`` (the messages), or a
-plain int of nanoseconds.
+A program that has loaded ROS's geometry_msgs gets its ``TransformStamped``, which it may publish.
+Any other program gets the classes of this module, which have the same fields. A time is an object
+with ``nanoseconds`` (rclpy's ``Time`` and ``Duration``) or with ``sec`` and ``nanosec`` (the
+messages), or a plain int of nanoseconds.
 
 The ``do_transform_…`` functions are those of tf2_geometry_msgs and tf2_sensor_msgs. Each returns a
-new message of the same type, in the frame and with the stamp of the transform; everything else in
-it is the given message's. ``TransformRegistration`` and ``ConvertRegistration`` are tf2_ros's: a
-package that brings a type of its own adds it there as it would to tf2_ros, for the whole program.
+new message of the same type, in the frame and with the stamp of the transform; everything else is
+copied from the given message. ``TransformRegistration`` and ``ConvertRegistration`` are tf2_ros's:
+a package registers its own type there as it would with tf2_ros, for the whole program.
 """
 
 from __future__ import annotations
@@ -40,9 +38,9 @@ _SECOND_NS = 1_000_000_000
 
 
 def complete_rclpy() -> None:
-    """Load rclpy's times where rclpy is loaded.
+    """Load rclpy's times if rclpy is loaded.
 
-    Tf2_ros imports them, so programs say ``rclpy.time.Time`` after ``import rclpy`` alone.
+    tf2_ros imports them, so programs use ``rclpy.time.Time`` after ``import rclpy`` alone.
     """
     if sys.modules.get("rclpy"):
         import tfcompose.tf.ros.rclpy_times  # noqa: F401, PLC0415 (ROS is optional)
@@ -57,7 +55,7 @@ class Time:
 
     @property
     def nanoseconds(self) -> int:
-        """The time in nanoseconds, as rclpy's ``Time`` says it."""
+        """The time in nanoseconds, as in rclpy's ``Time``."""
         return self.sec * _SECOND_NS + self.nanosec
 
 
@@ -98,7 +96,7 @@ class Transform:
 
 @dataclass(slots=True)
 class TransformStamped:
-    """geometry_msgs/TransformStamped: the pose of ``child_frame_id`` in ``header.frame_id``."""
+    """geometry_msgs/TransformStamped: the pose of a child frame in the header's frame."""
 
     header: Header = field(default_factory=Header)
     child_frame_id: str = ""
@@ -109,7 +107,8 @@ def nanoseconds(time: Any) -> int:
     """Return a time or a duration in nanoseconds.
 
     Raises:
-        TypeError: if it has neither ``nanoseconds`` nor ``sec`` and ``nanosec``, and is no int.
+        TypeError: if it has neither ``nanoseconds`` nor ``sec`` and ``nanosec``, and is not an
+            int.
     """
     try:
         return int(time.nanoseconds)
@@ -127,7 +126,7 @@ def nanoseconds(time: Any) -> int:
 
 
 def time_of(stamp_ns: int) -> Any:
-    """Return rclpy's ``Time`` where the program has loaded it, else this module's."""
+    """Return rclpy's ``Time`` if the program has loaded it, else this module's."""
     rclpy_time = sys.modules.get("rclpy.time")
     if rclpy_time is not None:
         return rclpy_time.Time(nanoseconds=stamp_ns)
@@ -156,9 +155,9 @@ def _plain_message(target: str, source: str, stamp_ns: int, pose: PoseTuple) -> 
 
 
 def _ros_maker() -> Maker:
-    """Return what makes ROS's message.
+    """Return the function that makes ROS's message.
 
-    By its fields directly, if that gives the same as by its constructor.
+    It sets fields directly if that gives the same as the constructor.
     """
     slow = _by_constructor()
     try:
@@ -228,7 +227,7 @@ def do_transform_point(point: Any, transform: Any) -> Any:
 
 
 def do_transform_vector3(vector: Any, transform: Any) -> Any:
-    """Return a Vector3Stamped in the transform's frame: turned, and not moved."""
+    """Return a Vector3Stamped in the transform's frame: rotated, not translated."""
     moved = _with_header_of(vector, transform)
     to, rotation = moved.vector, (0.0, 0.0, 0.0, *pose_of(transform)[3:])
     to.x, to.y, to.z = product(rotation, (to.x, to.y, to.z, 0.0, 0.0, 0.0, 1.0))[:3]
@@ -265,7 +264,7 @@ def do_transform_pose_stamped(pose: Any, transform: Any) -> Any:
 def do_transform_pose_with_covariance_stamped(pose: Any, transform: Any) -> Any:
     """Return a PoseWithCovarianceStamped in the transform's frame.
 
-    The covariances' axes are turned along.
+    The covariance is rotated, too.
     """
     moved = _with_header_of(pose, transform)
     moved.pose.pose = do_transform_pose(pose.pose.pose, transform)
@@ -276,7 +275,7 @@ def do_transform_pose_with_covariance_stamped(pose: Any, transform: Any) -> Any:
 def transform_covariance(covariance: Sequence[float], transform: Any) -> list[float]:
     """Return a 6×6 covariance (36 numbers by rows) with its axes rotated: R·C·Rᵀ.
 
-    Each of its four 3×3 blocks is turned by itself.
+    Each of its four 3×3 blocks is rotated separately.
     """
     _, _, _, x, y, z, w = pose_of(transform)
     rotation = matrix_from_quat((x, y, z, w))
@@ -301,7 +300,7 @@ def transform_points(point_cloud: ArrayLike, transform: Any) -> NDArray[Any]:
 
     Raises:
         InvalidArgumentException: if the last dimension is not 3.
-        ImportError: if there is no numpy.
+        ImportError: if numpy is not installed.
     """
     require_numpy()
     from tfcompose.tf.tf2.arrays import transform_points_array  # noqa: PLC0415 (numpy is optional)
@@ -320,12 +319,10 @@ def do_transform_polygon_stamped(polygon: Any, transform: Any) -> Any:
 
 
 def do_transform_cloud(cloud: Any, transform: Any) -> Any:
-    """Return a PointCloud2 in the transform's frame.
-
-    X, y and z are moved, every other byte is as it was.
+    """Return a PointCloud2 in the transform's frame: x, y and z moved, all other bytes unchanged.
 
     The fields may have any order, offsets, padding and byte order, and be float32 or float64; the
-    cloud may be organised and hold NaN. The time stays the cloud's. Needs numpy.
+    cloud may be organised and contain NaN. The time stays the cloud's. Needs numpy.
 
     Raises:
         InvalidArgumentException: if there is no x, y or z of such a type, or less data than the
@@ -353,7 +350,7 @@ TRANSFORMS: dict[str, Callable[[Any, Any], Any]] = {
 
 
 def require_numpy() -> None:
-    """Raise an ImportError that says what to install if there is no numpy."""
+    """Raise an ImportError that says what to install if numpy is missing."""
     if find_spec("numpy") is None:
         raise ImportError(
             "many points or poses at once need numpy: pip install 'tfcompose[arrays]'"
@@ -363,7 +360,7 @@ def require_numpy() -> None:
 def pose_of(transform: Any) -> PoseTuple:
     """Return the pose of a TransformStamped, or of a Transform, as numbers.
 
-    Its quaternion is brought to length 1; one of zeros counts as no rotation, as in tf2.
+    Its quaternion is normalised; one of zeros counts as no rotation, as in tf2.
     """
     inner = getattr(transform, "transform", transform)
     to, rotation = inner.translation, inner.rotation
@@ -372,9 +369,9 @@ def pose_of(transform: Any) -> PoseTuple:
 
 
 def _copy_with_header(headed: Any, stamp: Any) -> Any:
-    """Return a copy of a message or header whose stamp is given.
+    """Return a copy of a message or header with the given stamp.
 
-    Rclpy's ``Time`` cannot be copied, nor changed.
+    rclpy's ``Time`` cannot be copied, nor changed.
     """
     return deepcopy(headed, {} if hasattr(stamp, "sec") else {id(stamp): stamp})
 
@@ -397,22 +394,22 @@ def _with_header_of(message: Any, transform: Any) -> Any:
 
 
 class TransformRegistration:
-    """The functions that move objects of a type.
+    """Functions that transform objects, by type.
 
-    Messages that are known from the start go by their type's name.
+    Built-in messages are found by their type's name.
     """
 
     _moves: ClassVar[dict[type, Move]] = {}
 
     def add(self, key: type, callback: Move) -> None:
-        """Let ``Buffer.transform`` move objects of a type.
+        """Let ``Buffer.transform`` transform objects of a type.
 
-        ``callback(object, transform)`` returns the moved one.
+        ``callback(object, transform)`` returns the transformed object.
         """
         self._moves[key] = callback
 
     def get(self, key: type) -> Move:
-        """Return the function that moves objects of a type.
+        """Return the function that transforms objects of a type.
 
         Raises:
             TypeException: if there is none.
@@ -426,53 +423,50 @@ class TransformRegistration:
         return move
 
     def print_me(self) -> None:
-        """Print the names of the types that can be moved."""
+        """Print the names of the types that can be transformed."""
         sys.stdout.write("\n".join([*TRANSFORMS, *(each.__name__ for each in self._moves)]) + "\n")
 
 
 class ConvertRegistration:
-    """The functions that turn objects of one type into another.
-
-    Directly, or by way of a message.
-    """
+    """Functions that convert objects of one type into another, directly or through a message."""
 
     _to_msg: ClassVar[dict[type, Conversion]] = {}
     _from_msg: ClassVar[dict[type, Conversion]] = {}
     _direct: ClassVar[dict[tuple[type, type], Conversion]] = {}
 
     def add_to_msg(self, key: type, callback: Conversion) -> None:
-        """Add what makes a message of an object of this type."""
+        """Register the conversion of this type to a message."""
         self._to_msg[key] = callback
 
     def add_from_msg(self, key: type, callback: Conversion) -> None:
-        """Add what makes an object of this type of a message."""
+        """Register the conversion of a message to this type."""
         self._from_msg[key] = callback
 
     def add_convert(self, key: tuple[type, type], callback: Conversion) -> None:
-        """Add what makes an object of the second type of one of the first."""
+        """Register the conversion of the first type to the second."""
         self._direct[key] = callback
 
     def get_to_msg(self, key: type) -> Conversion:
-        """Return what makes a message; a message is one.
+        """Return the conversion to a message; for a message, the identity.
 
         Raises:
-            TypeException: if there is nothing.
+            TypeException: if there is none.
         """
         return self._to_msg.get(key) or _itself(key)
 
     def get_from_msg(self, key: type) -> Conversion:
-        """Return what makes an object of this type of a message.
+        """Return the conversion of a message to this type.
 
         Raises:
-            TypeException: if there is nothing.
+            TypeException: if there is none.
         """
         return self._from_msg.get(key) or _itself(key)
 
     def get_convert(self, key: tuple[type, type]) -> Conversion:
-        """Return what makes an object of the second type of one of the first.
+        """Return the conversion of the first type to the second.
 
         Raises:
-            TypeException: if there is nothing.
+            TypeException: if there is none.
         """
         if key not in self._direct:
             raise TypeException(f"nothing turns a {key[0].__name__} into a {key[1].__name__}")
@@ -480,12 +474,12 @@ class ConvertRegistration:
 
 
 def convert(a: Any, b_type: type) -> Any:
-    """Return an object as one of another type.
+    """Return an object converted to another type.
 
-    Directly, as a copy of itself, or by way of a message.
+    Directly, as a copy, or through a message.
 
     Raises:
-        TypeException: if nothing is registered that does it.
+        TypeException: if no such conversion is registered.
     """
     registry = ConvertRegistration()
     try:
@@ -500,7 +494,7 @@ def convert(a: Any, b_type: type) -> Any:
 
 
 def Stamped(obj: Any, stamp: Any, frame_id: str) -> Any:  # noqa: N802 (tf2_ros's name)
-    """Return the object with a header: ROS's where the program has loaded it."""
+    """Return the object with a header: ROS's if the program has loaded it."""
     made = getattr(sys.modules.get("std_msgs.msg"), "Header", Header)
     obj.header = made(stamp=stamp, frame_id=frame_id)
     return obj

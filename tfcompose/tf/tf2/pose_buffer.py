@@ -1,6 +1,4 @@
-"""The buffer without messages.
-
-Takes transforms as plain numbers, and answers where one frame is in another.
+"""The buffer without messages: takes transforms as plain numbers, and returns poses.
 
 Frames are names, times are integer nanoseconds since the epoch, poses are
 ``tfcompose.foundation.geometry.Pose``.
@@ -52,25 +50,23 @@ Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
 class FrameInfo:
     """A frame's edge to its parent.
 
-    ``parent`` is empty for a root, and for a moving frame after ``clear``.
-
-    Times are in nanoseconds since the epoch, and 0 for a fixed edge, which is good at any time;
-    ``samples`` counts what is kept.
+    Times are in nanoseconds since the epoch, and 0 for a fixed edge, which is valid at any time.
     """
 
     name: str
+    #: Empty for a root, and for a moving frame after ``clear``.
     parent: str
     static: bool
+    #: The sender, as given to ``set`` or ``insert``.
     authority: str
     oldest_ns: int
     newest_ns: int
+    #: Number of kept samples.
     samples: int
 
 
 class PoseBuffer:
-    """Takes transforms and answers where one frame is in another.
-
-    Safe to use from several threads.
+    """Takes transforms and returns the pose of one frame in another. Thread-safe.
 
     Args:
         cache_ns: how long samples are kept, in nanoseconds before the newest of their edge.
@@ -95,7 +91,7 @@ class PoseBuffer:
 
     @property
     def frames(self) -> frozenset[str]:
-        """Every frame that was heard of."""
+        """Every known frame."""
         with self._lock:
             return frozenset(self._names)
 
@@ -109,7 +105,7 @@ class PoseBuffer:
         static: bool,
         authority: str = "",
     ) -> bool:
-        """Take the pose of ``child`` in ``parent``; return False if tf2 would refuse it."""
+        """Take the pose of ``child`` in ``parent``; return False if tf2 would reject it."""
         row = (parent, child, 0, stamp_ns, *pose.xyz, *pose.quat_xyzw)
         return not self.insert([row], static=static, authority=authority)
 
@@ -118,8 +114,8 @@ class PoseBuffer:
     ) -> list[tuple[str, Rejection]]:
         """Take transforms in order; return the child and the reason of each that was rejected.
 
-        A leading slash is dropped from names, and quaternions are normalised. What is rejected
-        ``Rejection`` lists, in the words of tf2's log; infinite values count as not a number.
+        A leading slash is dropped from names, and quaternions are normalised. ``Rejection`` lists
+        the reasons, in the words of tf2's log; infinite values count as NaN.
         """
         rejected: list[tuple[str, Rejection]] = []
         with self._lock:
@@ -174,13 +170,13 @@ class PoseBuffer:
     def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:
         """Return the pose of ``source`` in ``target`` at a time, and that time, in ns.
 
-        Time 0 is the newest that all moving edges between them have reached; where none moves it
-        stays 0. The quaternion's w is not negative. A frame in itself is the identity, whether it
-        is known or not.
+        Time 0 is the newest that all moving edges between them have reached; if none moves it
+        stays 0. The quaternion's w is not negative. A frame in itself is the identity, even if it
+        is unknown.
 
         Raises:
             InvalidArgumentException: if a name is empty or starts with a slash.
-            LookupException: if a frame is not known.
+            LookupException: if a frame is unknown.
             ConnectivityException: if they are in two trees.
             ExtrapolationException: if an edge between them has no samples around that time.
         """
@@ -188,9 +184,9 @@ class PoseBuffer:
         return Pose((x, y, z), (quat[0], quat[1], quat[2], quat[3])), stamp_ns
 
     def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
-        """Return what ``lookup`` does for time 0.
+        """Return the same as ``lookup`` for time 0.
 
-        The time is None where only fixed edges are between the two.
+        The time is None if all edges between the two are fixed.
         """
         pose, stamp_ns = self.lookup(target, source)
         return pose, stamp_ns or None
@@ -199,7 +195,7 @@ class PoseBuffer:
         """Return the moving edge with the oldest newest sample, as "parent → child", or None.
 
         Raises:
-            LookupException: if a frame is not known.
+            LookupException: if a frame is unknown.
             ConnectivityException: if they are in two trees.
         """
         with self._lock:
@@ -210,12 +206,12 @@ class PoseBuffer:
             return f"{last.parent} → {last.child}"
 
     def all_frames(self) -> list[FrameInfo]:
-        """Return what is known of each frame, in the order in which they were first heard of."""
+        """Return the edge of each frame, in the order of their first appearance."""
         with self._lock:
             return [_frame_info(name, self._caches.get(name)) for name in self._names]
 
     def clear(self) -> None:
-        """Forget all samples of moving edges; fixed ones and the names stay, as in tf2."""
+        """Drop all samples of moving edges; fixed ones and the names stay, as in tf2."""
         with self._lock:
             for cache in self._caches.values():
                 if not cache.static:
@@ -224,7 +220,7 @@ class PoseBuffer:
             self._mixed.clear()
 
     def can_lookup(self, target: str, source: str, stamp_ns: int = 0) -> str:
-        """Return nothing if ``lookup`` would answer, else why it would not."""
+        """Return an empty text if ``lookup`` would answer, else the reason."""
         try:
             self._pose(target, source, stamp_ns)
         except TransformException as error:
@@ -232,11 +228,11 @@ class PoseBuffer:
         return ""
 
     def lock(self) -> RLock:
-        """Return a context in which nothing is taken, by any thread."""
+        """Return a context in which no thread can add transforms."""
         return self._lock
 
     def chain_for_all_times(self, target: str, source: str) -> PoseChain | None:
-        """Return the chain between two frames, None if a frame changed its parent.
+        """Return the chain between two frames; None if a frame changed its parent.
 
         Raises:
             LookupException, ConnectivityException, InvalidArgumentException: as ``lookup`` for
@@ -247,7 +243,7 @@ class PoseBuffer:
         return self._chain_between(target, source) if target != source else PoseChain((), ())
 
     def _pose(self, target: str, source: str, stamp_ns: int) -> tuple[PoseTuple, int]:
-        """Return what ``lookup`` does, as numbers."""
+        """Return the same as ``lookup``, as numbers."""
         with self._lock:
             if target == source:
                 return IDENTITY, stamp_ns or self._newest_ns(target)
@@ -284,7 +280,7 @@ class PoseBuffer:
     def _pose_at(self, target: str, source: str, stamp_ns: int) -> PoseTuple:
         """Return the pose by the parents of that time.
 
-        In a loop of frames the other way round may be the one.
+        In a loop of frames, the other direction may give it.
         """
         pose = chain_at(self._caches, target, source, stamp_ns).pose_at(stamp_ns)
         if pose is None:
@@ -294,10 +290,7 @@ class PoseBuffer:
         return pose
 
     def _chain_between(self, target: str, source: str, stamp_ns: int = 0) -> PoseChain:
-        """Return the chain between the two.
-
-        The one by newest parents, if there is any, is remembered.
-        """
+        """Return the chain between the two, and cache the one by newest parents if it exists."""
         self._require(target, "target_frame")
         self._require(source, "source_frame")
         try:
@@ -323,7 +316,7 @@ class PoseBuffer:
         return cache
 
     def _forget_chains(self, cache: TimeCache) -> None:
-        """Forget the chains, since an edge is new, or has another fixed pose or parent."""
+        """Drop the chains, because an edge is new, or has another fixed pose or parent."""
         self._chains.clear()
         (self._mixed.add if cache.mixed else self._mixed.discard)(cache.child)
 

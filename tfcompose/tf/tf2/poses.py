@@ -1,10 +1,8 @@
-"""Poses as seven plain numbers, for what is computed many times a second.
+"""Poses as seven plain numbers, for computations many times a second.
 
-X y z in metres, quaternion x y z w.
-
-``tfcompose.foundation.geometry.Pose`` is the same arithmetic with a type; it normalises
-quaternions at every step, this module only at the end. The functions take numpy arrays for the
-numbers as well, and then work on many poses at once.
+x y z in metres, quaternion x y z w. ``tfcompose.foundation.geometry.Pose`` is the same arithmetic
+with a type; it normalises quaternions at every step, this module only at the end. The functions
+also accept numpy arrays for the numbers, and then compute many poses at once.
 """
 
 from __future__ import annotations
@@ -65,7 +63,7 @@ def inverse(a: PoseTuple) -> PoseTuple:
 def unit(a: PoseTuple) -> PoseTuple:
     """Return the pose with a quaternion of length 1 and w ≥ 0.
 
-    Of the two for one rotation this is the shorter turn.
+    Of the two for one rotation, this is the shorter turn.
     """
     x, y, z, qx, qy, qz, qw = a
     squared = qx * qx + qy * qy + qz * qz + qw * qw
@@ -78,8 +76,8 @@ def unit(a: PoseTuple) -> PoseTuple:
 def between(two: Sequence[float], part: float) -> PoseTuple:
     """Return the pose at ``part`` (0 to 1) of the way between two, 14 numbers.
 
-    Positions go straight and rotations on the great circle, the short way (Shoemake, 1985), as in
-    tf2.
+    Positions are interpolated linearly and rotations on the great circle, the short way (Shoemake,
+    1985), as in tf2.
     """
     ax, ay, az, aqx, aqy, aqz, aqw, bx, by, bz, bqx, bqy, bqz, bqw = two
     dot = aqx * bqx + aqy * bqy + aqz * bqz + aqw * bqw

@@ -1,11 +1,10 @@
 """Rotations as Euler angles, quaternions and matrices: the functions of tf_transformations.
 
-This module needs numpy.
-
-``from tfcompose.tf.tf2 import transformations as tf_transformations`` is what a program changes.
-Quaternions are x y z w, angles in radians, matrices homogeneous, 4×4. ``axes`` names an order of
-rotations: ``s`` about the fixed (static) axes, ``r`` about those that rotate along, and three
-axes; ``sxyz``, the default, is roll, pitch and yaw as in URDF and tf2's ``setRPY``.
+This module needs numpy. A program replaces its import by ``from tfcompose.tf.tf2 import
+transformations as tf_transformations``. Quaternions are x y z w, angles in radians, matrices
+homogeneous, 4×4. ``axes`` names an order of rotations: ``s`` about the fixed (static) axes, ``r``
+about those that rotate with the frame, and three axes; ``sxyz``, the default, is roll, pitch and
+yaw as in URDF and tf2's ``setRPY``.
 """
 
 from __future__ import annotations
@@ -54,7 +53,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: str = "sxyz") -
 
 
 def euler_from_quaternion(quaternion: Numbers, axes: str = "sxyz") -> Vector:
-    """Return the three angles whose rotation the quaternion is."""
+    """Return the three angles of the quaternion's rotation."""
     return euler_from_matrix(quaternion_matrix(quaternion), axes)
 
 
@@ -64,12 +63,12 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: str = "sxyz") -> Floats:
 
 
 def euler_from_matrix(matrix: ArrayLike, axes: str = "sxyz") -> Vector:
-    """Return the three angles whose rotation the matrix is, 3×3 or 4×4.
+    """Return the three angles of the matrix's rotation, 3×3 or 4×4.
 
-    The middle one is from 0 to π where the first axis is also the last, and from −π/2 to π/2
-    elsewhere. At the ends of these only the sum or the difference of the others is known; then the
-    last one of fixed axes is 0, and the first one of axes that rotate along. (Shoemake, Graphics
-    Gems IV, 1994.)
+    The middle one is from 0 to π if the first axis is also the last, and from −π/2 to π/2
+    otherwise. At the ends of these ranges only the sum or the difference of the others is
+    determined; then the last one of fixed axes is 0, or the first one of rotating axes. (Shoemake,
+    Graphics Gems IV, 1994.)
     """
     fixed, order = _order(axes)
     rotation = np.asarray(matrix, float)[:3, :3]
@@ -97,10 +96,10 @@ def euler_from_matrix(matrix: ArrayLike, axes: str = "sxyz") -> Vector:
 
 
 def _order(axes: str) -> tuple[bool, list[int]]:
-    """Return whether the axes are fixed, and which they are: 0, 1 and 2 for x, y and z.
+    """Return whether the axes are fixed, and the axes: 0, 1 and 2 for x, y and z.
 
     Raises:
-        ValueError: if it is no order of rotations.
+        ValueError: if it is not an order of rotations.
     """
     order = [_AXES.find(axis) for axis in axes[1:]]
     if (
@@ -165,7 +164,7 @@ def quaternion_slerp(
 
 
 def quaternion_matrix(quaternion: Numbers) -> Floats:
-    """Return the rotation as a matrix; a quaternion of zeros is none."""
+    """Return the rotation as a matrix; a quaternion of zeros is no rotation."""
     quat = np.asarray(quaternion, float)
     length = np.linalg.norm(quat)
     matrix = np.identity(4)
@@ -190,19 +189,19 @@ def _four(quaternion: Numbers) -> Quaternion:
 
 
 def identity_matrix() -> Floats:
-    """Return the matrix that moves nothing."""
+    """Return the identity matrix."""
     return np.identity(4)
 
 
 def translation_matrix(direction: Numbers) -> Floats:
-    """Return the matrix that moves by x y z."""
+    """Return the matrix that translates by x y z."""
     matrix = np.identity(4)
     matrix[:3, 3] = direction[:3]
     return matrix
 
 
 def translation_from_matrix(matrix: ArrayLike) -> Floats:
-    """Return by what x y z a matrix moves the origin."""
+    """Return the translation x y z of a matrix."""
     moved: Floats = np.array(matrix, float)[:3, 3]
     return moved
 
@@ -223,7 +222,7 @@ def inverse_matrix(matrix: ArrayLike) -> Floats:
 
 
 def concatenate_matrices(*matrices: ArrayLike) -> Floats:
-    """Return the product of the matrices, from the left to the right."""
+    """Return the product of the matrices, from left to right."""
     found: Floats = np.identity(4)
     for matrix in matrices:
         found = found @ np.asarray(matrix, float)
@@ -231,18 +230,18 @@ def concatenate_matrices(*matrices: ArrayLike) -> Floats:
 
 
 def is_same_transform(matrix0: ArrayLike, matrix1: ArrayLike) -> bool:
-    """Return whether two homogeneous matrices, each with any scale, do the same."""
+    """Return whether two homogeneous matrices, each at any scale, are the same transform."""
     first, second = np.asarray(matrix0, float), np.asarray(matrix1, float)
     return bool(np.allclose(first / first[3, 3], second / second[3, 3]))
 
 
 def vector_norm(data: ArrayLike, axis: int | None = None) -> Any:
-    """Return the Euclidean length, of all or along an axis."""
+    """Return the Euclidean length, of the whole array or along an axis."""
     return np.linalg.norm(np.asarray(data, float), axis=axis)
 
 
 def unit_vector(data: ArrayLike, axis: int | None = None) -> Floats:
-    """Return the array at length 1, as a whole or along an axis."""
+    """Return the array scaled to length 1, as a whole or along an axis."""
     vector = np.array(data, float)
     length = np.linalg.norm(vector, axis=axis, keepdims=axis is not None)
     found: Floats = vector / length

@@ -1,4 +1,4 @@
-"""Velocity of one frame seen from another: the mean of a time, from the poses at its ends."""
+"""Mean velocity of one frame seen from another, from the poses at an interval's ends."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ _EARLIEST_NS = 10_000
 
 
 class Velocity(NamedTuple):
-    """``linear`` in m/s and ``angular`` in rad/s, each x y z."""
+    """Velocity of a frame, each part as x y z."""
 
+    #: In m/s.
     linear: Three
+    #: In rad/s.
     angular: Three
 
 
 class VelocityQuery(NamedTuple):
-    """A velocity's subject, observer, axes, and the point that moves along."""
+    """A velocity's subject, observer, axes, and the point that moves with the subject."""
 
     tracking_frame: str
     observation_frame: str
@@ -43,10 +45,8 @@ def mean_velocity(
 ) -> Velocity:
     """Return the mean velocity from ``begin_ns`` to ``end_ns``.
 
-    Axes and point are those at ``at_ns`` (0: newest).
-
-    What would begin before 10 µs since the epoch begins there, and is the mean over the shorter
-    time.
+    Axes and point are those at ``at_ns`` (0: newest). An interval that would begin before 10 µs
+    since the epoch begins there, and the mean is over the shorter time.
     """
     tracking, observation = moving.tracking_frame, moving.observation_frame
     begin_ns = max(begin_ns, _EARLIEST_NS)

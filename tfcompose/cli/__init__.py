@@ -1,7 +1,7 @@
 """The command line: the only part that reads files, writes files, prints and exits.
 
-``parser`` finds the command, ``commands`` has one module for each; what several commands share is
-here. A command imports what is heavy in its ``run``. Must not import ``tools``, ``rclpy``,
+``parser`` finds the command, ``commands`` has one module for each; code shared by several commands
+is here. A command imports heavy modules in its ``run``. Must not import ``tools``, ``rclpy``,
 ``yaml``: tools bring their own commands.
 """
 

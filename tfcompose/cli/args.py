@@ -1,4 +1,4 @@
-"""``--show-args``: the arguments of a robot file, for people."""
+"""``--show-args``: lists the arguments of a robot file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def show_args(arguments: Namespace) -> int:
     """Print the arguments of the robot file.
 
-    Exit code 0, or as for ``build`` where it cannot be read.
+    Exit code 0, or as for ``build`` if it cannot be read.
     """
     file = _file(arguments)
     if is_plan(file):
@@ -57,7 +57,7 @@ def args_and_profiles(
 
 
 def _file(arguments: Namespace) -> str:
-    """Return the robot file among the words, as each command calls it."""
+    """Return the robot file among the parsed arguments, as each command names it."""
     for name in ("file", "files", "old", "what"):
         value = getattr(arguments, name, None)
         if value:

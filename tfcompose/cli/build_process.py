@@ -1,6 +1,6 @@
 """A build in a separate process.
 
-The launcher, which lives as long as the robot runs, never holds the compiler.
+That keeps the compiler out of the launcher's memory, which lasts as long as the robot runs.
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ if TYPE_CHECKING:
 
 
 class BuildProcess:
-    """Builds a robot while this process goes on.
+    """Builds a robot in a child process while this process continues.
 
-    What is found is printed there, on the same terminal.
-
-    It has a process group of its own, so that a Ctrl-C comes to it once, from here: an error in
-    the ``with`` block interrupts the build and waits for its end.
+    The child prints its findings on the same terminal. It has its own process group, so that it
+    receives a Ctrl-C only once, from this process: an error in the ``with`` block interrupts the
+    build and waits for its end.
     """
 
     def __init__(self, arguments: Namespace) -> None:
@@ -67,8 +66,8 @@ class BuildProcess:
         """Wait for the build to end; return its plan file and the warnings it printed.
 
         Raises:
-            SystemExit: with the build's exit code, if it failed, after it said why.
-            OSError: if that is what ended it.
+            SystemExit: with the exit code of a failed build, which has printed the reason.
+            OSError: if one ended the build.
         """
         with open(self._pipe, "rb", closefd=False) as pipe:
             answer = pipe.read()
@@ -92,9 +91,8 @@ class BuildProcess:
 def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
     """Build and return the exit code.
 
-    Write the plan's file and the findings, or the number of an OSError.
-
-    ``mask`` is the mask of signals of before the fork.
+    Writes the plan's path and the findings to ``answer``, or the number of an OSError. ``mask`` is
+    the signal mask from before the fork.
     """
     code = FAILED
     try:

@@ -1,4 +1,4 @@
-"""Parser of one command's options, with a way out in each error."""
+"""Parser of one command's options; each error suggests a way out."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ArgumentRow(NamedTuple):
 
 class _Formatter(HelpFormatter):
     def row(self, action: Action) -> ArgumentRow:
-        """Return what the help shows of an argument."""
+        """Return an argument's row in the help."""
         name = max(action.option_strings, key=len, default=action.dest)
         return ArgumentRow(name, self._format_action_invocation(action), self._expand_help(action))
 
@@ -56,7 +56,7 @@ class Parser(ArgumentParser):
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return the parsed arguments; ``cameras:=4`` is an argument of the robot file.
 
-        It may stand anywhere on the command line.
+        It may be anywhere on the command line.
         """
         argv = list(args or ())
         ros_args: list[str] = []
@@ -74,7 +74,7 @@ class Parser(ArgumentParser):
         return arguments
 
     def _settings(self, argv: Sequence[str]) -> tuple[list[str], list[str]]:
-        """Return the words NAME:=VALUE, except those that belong to an option, and the rest."""
+        """Return arguments NAME:=VALUE, except those that belong to an option, and the rest."""
         renaming = {
             option
             for action in self._actions
@@ -91,7 +91,7 @@ class Parser(ArgumentParser):
         return settings, rest
 
     def argument_rows(self) -> dict[str, list[ArgumentRow]]:
-        """Return the arguments by their headings, without ``--help``."""
+        """Return the arguments by heading, without ``--help``."""
         formatter = _Formatter(self.prog)
         rows: dict[str, list[ArgumentRow]] = {}
         for action in self._actions:
@@ -108,7 +108,7 @@ class Parser(ArgumentParser):
 
 
 def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the command line without ROS arguments, and those, as rcl separates them.
+    """Return the command line without ROS arguments, and these, as rcl separates them.
 
     They follow ``--ros-args``, up to the end or ``--``.
     """
@@ -132,7 +132,7 @@ _GIVEN = re.compile(r"[^\s=:-][^\s=:]*:=")
 class CommandModule(Protocol):
     """Module of a command, or an object in one.
 
-    Its docstring is its line in the list, and below that its help.
+    The first line of its docstring is its summary in lists, the rest its help.
     """
 
     __doc__: str | None
@@ -141,13 +141,13 @@ class CommandModule(Protocol):
         """Add the command's arguments."""
 
     def run(self, arguments: Namespace, /) -> int:
-        """Do it and return the exit code."""
+        """Run the command and return the exit code."""
 
 
 def command_parser(name: str, command: CommandModule, columns: int = 0) -> Parser:
     """Return the parser of a command, without the options that tools add to it.
 
-    Its help has that many columns, by default those of the terminal, and 100 at most.
+    Its help is ``columns`` wide, by default as the terminal, and 100 at most.
     """
     width = columns or min(100, size_of(1)[0] - 2)
     parser = Parser(

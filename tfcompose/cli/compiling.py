@@ -1,9 +1,6 @@
-"""From the files that the command line names to a compiled robot.
+"""Compilation of the files that the command line names, with presets and overlays.
 
-Presets, overlays, findings printed.
-
-The compiler asks here about files on this machine: which are there, where packages are, and a
-mesh's volume.
+Also the compiler's access to this machine: files, packages, and the volumes of meshes.
 """
 
 from __future__ import annotations
@@ -58,22 +55,17 @@ PRESET_INDEX = "share/ament_index/resource_index/tfcompose_presets"
 
 
 def library(read: Callable[[str], str] = read_text) -> Library:
-    """Return the presets that are known without a robot file.
-
-    Tfcompose's own, then those of packages.
-    """
+    """Return the presets known without a robot file: tfcompose's own, then those of packages."""
     return Library((str(PRESETS),), PresetFolders(read), str(PRESETS))
 
 
 @dataclass(frozen=True, slots=True)
 class PresetFolders:
-    """Presets in folders of this machine.
+    """Presets in folders of this machine."""
 
-    ``open_text`` returns the text of a file or raises RejectedError, ``allows`` tells whether a
-    path may be looked at.
-    """
-
+    #: Returns the text of a file or raises RejectedError.
     open_text: Callable[[str], str] = read_text
+    #: Whether a path may be accessed.
     allows: Callable[[str], bool] = lambda _: True
 
     def has(self, path: str) -> bool:
@@ -98,7 +90,7 @@ class PresetFolders:
         return [f"{vendor}/{model}" for vendor, model in files if vendor != "nodes"]
 
     def packages(self) -> list[str]:
-        """Return the folders that installed Python and ROS packages bring."""
+        """Return the folders from installed Python and ROS packages."""
         return _preset_packages()
 
 
@@ -120,9 +112,8 @@ def _preset_packages() -> list[str]:
 def _ros_preset_packages() -> list[str]:
     """Return the folders that ROS packages register in the ament index of the sourced workspaces.
 
-    A marker names the folder, relative to its prefix; an empty one stands for
-    ``share/NAME/presets``. Of a package in several workspaces that of the first one counts, as ROS
-    has it.
+    A marker names the folder, relative to its prefix; an empty one means ``share/NAME/presets``.
+    If several workspaces have a package, the first one counts, as in ROS.
     """
     folders: dict[str, str] = {}
     for prefix in _ament_prefixes():
@@ -142,17 +133,17 @@ def _ament_prefixes() -> tuple[str, ...]:
 def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) -> list[Source]:
     """Return the overlays of --overlay and --set, in that order.
 
-    ``read`` gives a file's text.
+    ``read`` returns a file's text.
 
     Raises:
-        RejectedError: if a file cannot be read or is not YAML, or a setting is not one.
+        RejectedError: if a file cannot be read or is not YAML, or a setting is malformed.
     """
     files = [with_includes(load(read(file), file), read) for file in arguments.overlays]
     return [*files, *(set_value(setting) for setting in arguments.settings)]
 
 
 def disk_of(file: str, arguments: Namespace) -> Disk:
-    """Return this machine's files for a robot file that the command line names."""
+    """Return this machine's files for a robot file named on the command line."""
     return disk(trusts_files=arguments.trust, sources=[file])
 
 
@@ -160,7 +151,7 @@ def inputs_of(arguments: Namespace) -> Given:
     """Return the robot's inputs from command line and environment.
 
     Raises:
-        SystemExit: after saying what is wrong with ROS arguments.
+        SystemExit: after reporting wrong ROS arguments.
     """
     args = {
         name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()
@@ -172,7 +163,7 @@ def compile_or_exit(file: str, arguments: Namespace) -> Robot:
     """Return the robot, which has no errors; warnings are printed.
 
     Raises:
-        SystemExit: after printing what is wrong with it.
+        SystemExit: after printing its errors.
     """
     return compile_without_errors(file, arguments)[0]
 
@@ -181,7 +172,7 @@ def compile_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Comp
     """Return the robot and its compiled files; print warnings.
 
     Raises:
-        SystemExit: after printing what is wrong with it.
+        SystemExit: after printing its errors.
     """
     try:
         overlays = overlays_of(arguments)
@@ -207,7 +198,7 @@ def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]
     """Return the edges from ``a`` and from ``b`` up to their common ancestor.
 
     Raises:
-        SystemExit: after saying that a frame is not there, or that nothing connects the two.
+        SystemExit: after reporting a missing frame, or that the two are not connected.
     """
     for frame in (a, b):
         if frame not in robot.frames:
@@ -243,10 +234,10 @@ def disk(
     folders: Sequence[str] = (),
     is_strict: bool = False,
 ) -> Disk:
-    """Return this machine's files, with the packages of the workspaces that are sourced.
+    """Return this machine's files, with the packages of the sourced workspaces.
 
     Xacro files may also read the trees of ``sources``, and these ``folders``; everything if files
-    are trusted. With ``is_strict`` none is expanded where the kernel cannot confine it.
+    are trusted. With ``is_strict`` no xacro file is expanded if the kernel cannot confine it.
     """
     prefixes = tuple(
         prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix
@@ -290,7 +281,7 @@ def _is_pointer(path: str) -> bool:
 def moments(path: str, scale: Vector) -> Moments:
     """Return volume, centre and tensor of a closed mesh at a scale.
 
-    What reads meshes is loaded only here.
+    Imports the mesh library only when called.
 
     Raises:
         UnmeasurableError: as ``tfcompose.urdf.mesh.moments``, and if trimesh is not installed.
@@ -308,10 +299,7 @@ def moments(path: str, scale: Vector) -> Moments:
 
 
 def print_output(file: str, text: str) -> None:
-    """Print the output of a file that was run to read it.
-
-    Each line with the file's name, on stderr.
-    """
+    """Print the output of a file that was run to read it, on stderr after the file's name."""
     for line in text.splitlines():
         sys.stderr.write(f"{printable(file)}: {plain(line)}\n")
 
@@ -332,7 +320,7 @@ def report_missing_confinement(missing: Sequence[str]) -> None:
 
 
 def missing_confinement(feature: str) -> Finding:
-    """Return the finding that the kernel lacks something to confine files with."""
+    """Return the finding that the kernel lacks a feature to confine files."""
     message = f"this kernel has no {feature}: {_NOT_HELD[feature]}"
     advice = "tfcompose help sandbox; read files of strangers on another machine"
     return finding("TF923", message, None, help=advice)

@@ -1,7 +1,6 @@
 """Completion of a command line: commands, options, their values, and names of the robot file.
 
-argcomplete reads the line and answers the shell; the sources here know the names that an argument
-can have.
+argcomplete reads the line and answers the shell; this module supplies the names for each argument.
 """
 
 from __future__ import annotations
@@ -91,7 +90,7 @@ class _Completer:
 
 
 def _source_of(action: Action, command: str, commands: Iterable[str]) -> Source:
-    """Return the function that lists the names an argument of the command can have."""
+    """Return the function that lists the possible names for an argument of the command."""
     if command == "help":
         return partial(_help_pages, commands)
     source = _SOURCES.get((command, action.dest)) or _SOURCES.get(("", action.dest))
@@ -103,7 +102,7 @@ def _source_of(action: Action, command: str, commands: Iterable[str]) -> Source:
 
 
 def _frames(argv: Sequence[str]) -> list[str]:
-    """Return the frames of the robot file; before it is named, nothing: files are meant."""
+    """Return the frames of the robot file; nothing before it is named, to complete files."""
     from tfcompose.cli.compiling import library
     from tfcompose.compiler.compile import compile_source
     from tfcompose.spec.load import load
@@ -145,7 +144,7 @@ def _codes_or_frames(argv: Sequence[str]) -> list[str]:
 
 
 def _section(name: str, argv: Sequence[str]) -> list[str]:
-    """Return the names in a section of the robot file that is given, or of that of this folder."""
+    """Return the names in a section of the given robot file, or of the one in this folder."""
     from tfcompose.spec.load import load
 
     file = next(

@@ -1,4 +1,4 @@
-"""Output of ``up``: each process's log behind its name, reports, and a status line."""
+"""Output of ``up``: log lines prefixed with their process, reports, and a status line."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ class Output(Protocol):
         """Write the text.
 
         Raises:
-            OSError: if nobody reads any more.
+            OSError: if the reader is gone.
         """
 
 
 class StandardOutput:
-    """Standard output, which is written at once."""
+    """Standard output, unbuffered."""
 
     def write(self, text: str, *, log: bool = False) -> None:
         """Write the text."""
@@ -90,7 +90,7 @@ class StandardOutput:
 
 
 class Nowhere:
-    """Takes what is kept elsewhere."""
+    """Discards lines that are kept elsewhere."""
 
     def write(self, text: str, *, log: bool = False) -> None:
         """Do nothing."""
@@ -99,10 +99,9 @@ class Nowhere:
 class Console:
     """Writes notices as lines: ``name | text``, coloured on a terminal.
 
-    ``address_of`` gives the pages that codes of findings lead to.
-    ``keep`` gets each line without colours, and may return a complaint to print; ``status`` stays
-    below the lines. A process's own lines are only kept, or only written, where its ``output``
-    says so.
+    ``address_of`` returns the page of a finding's code. ``keep`` receives each line without
+    colours, and may return an error to print; ``status`` stays below the lines. A process's own
+    lines are only kept, or only written, if its ``output`` says so.
     """
 
     def __init__(  # noqa: PLR0913 (all but two are named)
@@ -135,10 +134,10 @@ class Console:
         }
 
     def __call__(self, notice: Notice) -> None:
-        """Write the lines of a notice, at once.
+        """Write the lines of a notice at once.
 
         Raises:
-            OSError: if nobody reads any more.
+            OSError: if the reader is gone.
         """
         if self._status:
             self._status.take(notice)
@@ -146,10 +145,10 @@ class Console:
         self.refresh()
 
     def refresh(self) -> None:
-        """Bring the line below the lines up to date.
+        """Update the status line.
 
         Raises:
-            OSError: if nobody reads any more.
+            OSError: if the reader is gone.
         """
         text = self._status.draw() if self._status else ""
         if text:
@@ -290,7 +289,7 @@ class Console:
         )
 
     def _is_printed(self, quoted: str) -> bool:
-        """Return whether a quoted line is among the last that its process printed."""
+        """Return whether a quoted line is among the last ones printed by its process."""
         return any(quoted in lines for lines in self._printed.values())
 
     def _say(self, text: str) -> None:
@@ -309,7 +308,7 @@ class Console:
         keep: bool = True,
         is_rendered: bool = False,
     ) -> None:
-        """Write a line; keep only colours of lines from other programs."""
+        """Write a line; of control sequences in other programs' lines, keep only colours."""
         fault = self._kept(name, text) if keep else None
         clear = self._status.clear() if self._status else ""
         shown = text
@@ -332,7 +331,7 @@ class Console:
 def describe_changes(change: PlanChange | Replanned, labels: Sequence[str]) -> str:
     """Return the processes that another plan changes, adds, removes or gives a new description.
 
-    Each group has its label, in this order; empty if nothing has to be restarted.
+    Each group has its label, in this order; empty if no process has to restart.
     """
     return "; ".join(
         f"{label}: {', '.join(names)}"
@@ -353,7 +352,7 @@ def describe_vanished_edges(edges: tuple[str, ...]) -> str:
 
 
 def _start_table(notice: AllReady) -> list[str]:
-    """Return a line per process: when it started and when it was ready; and the total.
+    """Return a line per process with the times it started and was ready, and the total.
 
     Times are seconds from the start.
     """
@@ -366,11 +365,9 @@ def _start_table(notice: AllReady) -> list[str]:
 
 
 class StatusLine:
-    """The line below the log on a terminal.
+    """The line below the log on a terminal: running processes, live edges, and missing ones.
 
-    How many processes run, how many edges are live, and what is missing.
-
-    It counts what notices say. ``columns`` gives the terminal's width.
+    It counts notices. ``columns`` returns the terminal's width.
     """
 
     def __init__(
@@ -413,7 +410,7 @@ class StatusLine:
     def draw(self) -> str:
         """Return the control sequence that redraws the line.
 
-        Nothing where that would change nothing, or was done a moment ago.
+        Empty if the line is unchanged, or was just drawn.
         """
         text = "" if self._ended else self._fitting(max(self._columns() - STATUS_FREE_COLUMNS, 1))
         now = self._clock()
@@ -423,7 +420,7 @@ class StatusLine:
         return f"{CLEAR_LINE}{text}" if before else text
 
     def _fitting(self, columns: int) -> str:
-        """Return the longest way to say it that fits."""
+        """Return the longest version of the line that fits."""
         seconds = int(self._clock() - self._begun)
         clock = f"[{seconds // 60:02d}:{seconds % 60:02d}]"
         long, short = (
@@ -449,7 +446,7 @@ class StatusLine:
     def _runs(self, name: str) -> bool:
         """Return whether the process runs.
 
-        One that others start does when its edges are live, as far as is known.
+        A process started elsewhere counts as running when its edges are live.
         """
         state = self._states.get(name)
         return state in ("running", "stopping") or (

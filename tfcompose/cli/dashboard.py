@@ -1,9 +1,8 @@
 """Live view of ``up``: pages of lines for a terminal of any size, and the keys that change them.
 
-It knows what it is given: notices and answers of the launcher, the plan, what processes use, and
-lines of logs. Lines are rich's texts, because characters of several columns count there as a
-terminal counts them. The tables are tfcompose's own, which leave out columns where rich would
-shorten numbers.
+Its inputs are notices and answers of the launcher, the plan, usage of processes, and log lines.
+Lines are rich's texts, because these count wide characters as a terminal does. The tables are
+tfcompose's own. They drop columns, while rich would shorten numbers.
 """
 
 from __future__ import annotations
@@ -91,20 +90,21 @@ _EDGE_HEAD = ("EDGE", "OWNER", "KIND", "RATE", "STATE")
 
 @dataclass(frozen=True, slots=True)
 class _Reported:
-    """A finding, or that one is over, with when (seconds since 1970) and its lines, coloured."""
+    """A finding or its end."""
 
+    #: In seconds since 1970.
     at: float
+    #: Coloured.
     lines: tuple[Text, ...]
 
 
 @dataclass(slots=True)
 class _Scroll:
-    """Which part of a list is shown.
+    """The visible part of a list."""
 
-    ``back`` is how many of its last lines are below the window.
-    """
-
+    #: How many of its last lines are below the window.
     back: int = 0
+    #: Height of the window in lines.
     room: int = 1
 
     def move(self, lines: int) -> None:
@@ -112,7 +112,7 @@ class _Scroll:
         self.back = max(self.back + lines, 0)
 
     def window(self, count: int, room: int) -> slice:
-        """Return which of that many lines fit into the room."""
+        """Return the slice of ``count`` lines that fits into the room."""
         self.room = max(room, 1)
         self.back = min(self.back, max(count - self.room, 0))
         end = count - self.back
@@ -121,25 +121,23 @@ class _Scroll:
 
 @dataclass(slots=True)
 class Dashboard:
-    """The live view's state. ``name`` is the robot's with its domain.
+    """The live view's state."""
 
-    ``clock`` gives seconds since 1970.
-
-    The findings of the build and ``warnings`` were printed before the view, and are its first
-    findings and events.
-
-    ``status`` and ``used`` are what was learned last; ``log_of`` names the process whose log is to
-    be read for ``add_log_lines``, if a log is shown.
-    """
-
+    #: The robot's name with its domain.
     name: str
     plan: Plan
+    #: The findings of the build, printed before the view; its first findings.
     built_with: Sequence[Finding] = ()
+    #: Warnings printed before the view; its first events.
     warnings: Sequence[str] = ()
+    #: Returns seconds since 1970.
     clock: Callable[[], float] = time.time
+    #: The launcher's last answer.
     status: RobotStatus | None = None
+    #: The last measured usage of processes.
     used: Usage = field(default_factory=dict)
     page: Page = "processes"
+    #: The process whose log to read for ``add_log_lines``; None: no log is shown.
     log_of: str | None = None
     stopping: str = ""
     ended: Ended | None = None
@@ -185,7 +183,7 @@ class Dashboard:
             self.ended = notice
 
     def forget(self) -> None:
-        """Forget all notices: they will be sent again."""
+        """Drop all notices: they will be sent again."""
         self._reports.clear()
         self._events.clear()
         self._events.extend(
@@ -246,7 +244,7 @@ class Dashboard:
         scroll.back = 1 << 30 if page in ("edges", "help") else 0
 
     def _show_log(self, number: int) -> None:
-        """Show the log of the process of that number, from 0; -1 is the launcher."""
+        """Show the log of the process at that index, from 0; -1 is the launcher."""
         names = [LAUNCHER, *(process.name for process in self._processes())]
         if number + 1 >= len(names) or number < -1:
             return
@@ -371,7 +369,7 @@ class Dashboard:
         return found
 
     def _process_lines(self, columns: int, rows: int) -> list[Text]:
-        """Return the table's head and the processes that fit, the chosen one among them."""
+        """Return the table's head and the processes that fit, including the chosen one."""
         rows_of = [row(process, self.used) for process in self._processes()]
         head, *shown = (
             Text.from_ansi(line)
@@ -391,7 +389,7 @@ class Dashboard:
         return found
 
     def _news(self) -> list[Text]:
-        """Return the first line of each report, or the launcher's lines if there is none."""
+        """Return the first line of each report, or if there are none, the launcher's lines."""
         if self._reports:
             return [self._with_time(report.at, report.lines[0]) for report in self._reports]
         return [self._with_time(at, _style_line(line)) for at, line in self._events]
@@ -465,7 +463,7 @@ _LINK_ID = re.compile(r"\033\]8;id=[^;]*;")
 
 
 def _ends(text: str, width: int) -> Sequence[str]:
-    """Return the text up to where each row of that width ends, but for the last one."""
+    """Return the text up to the end of each row of that width, except the last one."""
     pieces = chop_cells(text, max(width, 1))
     return ["".join(pieces[: number + 1]) for number in range(len(pieces) - 1)]
 

@@ -1,7 +1,4 @@
-"""Pages of topics and commands.
-
-Markdown in ``topics/``, and what the code knows better than a page.
-"""
+"""Pages of topics and commands: Markdown in ``topics/``, and parts generated from the code."""
 
 from __future__ import annotations
 
@@ -73,7 +70,7 @@ def topic_groups() -> dict[str, dict[str, str]]:
 def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
     """Return the page of a topic, the options and page of a command, or the meaning of a key.
 
-    A topic with the name of a key ends with the key. None if there is none.
+    A topic named like a key ends with the key. None if there is nothing of that name.
     """
     if name in commands:
         options, about = _options(name, commands[name]), text_of_command(name, commands[name])
@@ -132,13 +129,13 @@ def _options(name: str, command: CommandModule) -> str:
 
 
 def text_of_command(name: str, command: CommandModule) -> str:
-    """Return the page of a command as Markdown, empty if it has none; a tool has its own pages."""
+    """Return a command's page as Markdown, empty if it has none; tools have their own pages."""
     folder = command.tool.topic_folder if isinstance(command, ToolCommand) else FOLDER
     return _read(topic_of_command(name, command), folder)
 
 
 def topic_of_command(name: str, command: CommandModule) -> str:
-    """Return the name of a command's page: a topic, or a page that is the command's alone."""
+    """Return the name of a command's page: a topic, or a page for the command alone."""
     return (isinstance(command, ToolCommand) and command.command.topic) or name
 
 

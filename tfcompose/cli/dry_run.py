@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def dry_run(arguments: Namespace) -> int:
     """Print the processes of a robot or a built plan; exit code as for ``build``.
 
-    Nothing is written.
+    Writes nothing.
     """
     if is_plan(arguments.file):
         file = Path(arguments.file)

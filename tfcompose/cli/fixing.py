@@ -1,6 +1,6 @@
 """``tfcompose lint --fix``: apply fixes that have one safe answer.
 
-Edits are tried in memory first. Only those are kept that take away their finding and bring no new
+Edits are first tried in memory. An edit is kept only if it removes its finding and causes no new
 one.
 """
 
@@ -32,22 +32,19 @@ _NO_YAML = "TF002"
 
 
 class ChangedError(OSError):
-    """Somebody else has changed the file since it was read."""
+    """Raised when another program has changed the file since it was read."""
 
 
 @dataclass(slots=True)
 class Fixer:
-    """Fixes files that were named.
-
-    ``lint`` returns a file's findings, through the reader that it is given.
-
-    ``fixed`` are the findings that are gone, with their places before; ``texts`` what the files
-    then hold.
-    """
+    """Fixes the named files."""
 
     files: Sequence[str]
+    #: Returns a file's findings, using the given reader.
     lint: Lint
+    #: The removed findings, with their former places.
     fixed: list[Finding] = field(default_factory=list)
+    #: The files' new texts.
     texts: dict[str, str] = field(default_factory=dict)
     _read: dict[str, str] = field(default_factory=dict)
 
@@ -87,7 +84,7 @@ class Fixer:
             )
 
     def read(self, file: str) -> str:
-        """Return the file's text as it will be; a file is read once."""
+        """Return the file's future text; a file is read once."""
         path = _path(file)
         if path not in self._read:
             self._read[path] = read_text(file)
@@ -112,7 +109,7 @@ class Fixer:
         return self._sound(file, self._sound(file, kept, todo[:half]), todo[half:])
 
     def _is_sound(self, file: str, fixed: list[Finding]) -> bool:
-        """Whether these edits remove the findings and cause no others."""
+        """Return whether these edits remove the findings and cause no others."""
         files = dict.fromkeys(
             [file, *(edit.span.file for finding in fixed for edit in finding.edits)]
         )
@@ -152,10 +149,10 @@ def _count_findings(findings: Iterable[Finding]) -> Counter[tuple[str, str]]:
 def rewrite(path: Path, old: str, new: str) -> None:
     """Write the new text to the file, atomically.
 
-    Its mode, owner and byte order mark stay.
+    Mode, owner and byte order mark stay.
 
     Raises:
-        OSError: if the file cannot be written; it is as it was.
+        OSError: if the file cannot be written; it is unchanged.
     """
     if not os.access(path, os.W_OK):
         raise PermissionError(13, "Permission denied", str(path))

@@ -1,4 +1,4 @@
-"""The keys of a terminal, by name."""
+"""Keys of a terminal, by name."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ _BEGUN = re.compile(r"\033(?:[\[O][0-9;]*)?\Z")
 
 
 class KeyDecoder:
-    """Bytes of a terminal into the names of keys."""
+    """Decodes bytes from a terminal into names of keys."""
 
     def __init__(self) -> None:
         self._rest = ""
 
     @property
     def waits(self) -> bool:
-        """Whether a key has begun that may go on.
+        """Whether the input ends within a possible key.
 
-        After a moment without more, ``end`` says what it was.
+        If no more input follows within a moment, ``end`` returns the keys so far.
         """
         return bool(self._rest)
 
     def feed(self, data: bytes) -> list[str]:
-        """Return the keys that are complete."""
+        """Return the completed keys."""
         text = self._rest + data.decode(errors="replace")
         begun = _BEGUN.search(text)
         self._rest = text[begun.start() :] if begun else ""
         return _keys(text[: len(text) - len(self._rest)])
 
     def end(self) -> list[str]:
-        """Return the keys in the input, if no more input follows."""
+        """Return the keys in the input if no more input follows."""
         text, self._rest = self._rest, ""
         return _keys(text)
 
@@ -62,5 +62,5 @@ def _keys(text: str) -> list[str]:
 
 
 def _key_name(sequence: str, char: str) -> str:
-    """Return the name of a key; an escape sequence that no key sends has none."""
+    """Return the name of a key; empty for an escape sequence that no key sends."""
     return _NAMED.get(sequence, "") if sequence else _NAMED.get(char, char)

@@ -1,4 +1,4 @@
-"""Judgement of one file for ``lint``: a robot file in its variants, or a URDF or xacro file."""
+"""Findings of one file for ``lint``: a robot file in its variants, or a URDF or xacro file."""
 
 from __future__ import annotations
 
@@ -28,31 +28,31 @@ JUDGE_FOR_S = 60.0
 
 
 class _LintFiles(NamedTuple):
-    """Files that a robot file may read, and the variables that its arguments may."""
+    """Files that a robot file may read, and variables that its arguments may read."""
 
     read: Callable[[str], str]
     presets: Library
-    #: Of the file, with what it includes.
+    #: For the file and its includes.
     disk_of: Callable[[Source], Disk]
     environment_of: Callable[[Source], Mapping[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
 class Linter:
-    """Judges files as the command line says."""
+    """Lints files with the command line's options."""
 
     arguments: Namespace
     presets: Library
-    #: What arguments of untrusted robot files may take from the environment.
+    #: The variables that arguments of untrusted robot files may read.
     environment: Mapping[str, str]
-    #: Whether the command is about one file: then an argument that it does not have is a mistake.
+    #: True: the command is about one file, so an argument that it lacks is an error.
     has_one_file: bool
 
     def lint_robot(self, file: str, read: Callable[[str], str]) -> list[Finding]:
         """Return the findings of a robot file, in the order of their places.
 
-        It is judged alone and with each of its profiles, or with those that are requested, and
-        alone in each combination of its arguments' values.
+        It is checked alone and with each of its profiles, or with the requested ones, and alone in
+        each combination of its arguments' values.
         """
         from tfcompose.cli.compiling import inputs_of, overlays_of
         from tfcompose.foundation.findings import RejectedError
@@ -92,7 +92,7 @@ class Linter:
         return lint_urdf(file, packages, self.arguments.given)
 
     def _files_of(self, file: str, read: Callable[[str], str]) -> _LintFiles:
-        """Return all files of this machine; with --untrusted those of the robot's tree."""
+        """Return all files of this machine; with --untrusted, those of the robot's tree."""
         if not self.arguments.untrusted:
             from tfcompose.cli.compiling import disk
 
@@ -113,7 +113,7 @@ class Linter:
 
 @dataclass(frozen=True, slots=True)
 class _Variants:
-    """A robot file in the variants that its profiles and arguments make of it."""
+    """A robot file in its variants by profiles and arguments."""
 
     source: Source
     overlays: Sequence[Source]
@@ -212,7 +212,7 @@ def merge_findings(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> l
 
 
 def _name_combinations(every: Sequence[Combination], where: Sequence[int]) -> str:
-    """Return in which combinations something is, by the fewest arguments that say so."""
+    """Return the combinations that have something, described by the fewest arguments."""
     inside = set(where)
     first = every[where[0]]
     best, covered = dict(first), 1
@@ -240,5 +240,5 @@ def _identity(finding: Finding) -> _Identity:
 
 
 def _judgement(finding: Finding) -> tuple[str, str] | None:
-    """Return the findings of rules about the robot; None for findings about text and keys."""
+    """Return a key for findings of rules about the robot; None for those about text and keys."""
     return (finding.code, finding.message) if finding.code >= "TF2" else None

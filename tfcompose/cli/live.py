@@ -41,7 +41,7 @@ def refuse_live_bag(arguments: Namespace) -> None:
     """Refuse --live together with --bag.
 
     Raises:
-        SystemExit: after saying so.
+        SystemExit: after reporting it.
     """
     if arguments.live and arguments.bag:
         fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
@@ -50,10 +50,10 @@ def refuse_live_bag(arguments: Namespace) -> None:
 def observe_for(name: str, arguments: Namespace) -> tuple[Plan | None, dict[Topics, TreeObserver]]:
     """Return the plan of FILE, if given, and the observation of the topics (moving, fixed).
 
-    On its own, or --namespace's. ``name`` is that of the node that observes.
+    The topics are the plan's, or those of --namespace. ``name`` is the observing node's name.
 
     Raises:
-        SystemExit: after saying what cannot be read or observed, or asked for together.
+        SystemExit: after reporting unreadable input, a failed observation or conflicting options.
     """
     refuse_live_bag(arguments)
     plan = expected_plan(arguments.file, arguments)[0] if arguments.file is not None else None
@@ -68,7 +68,7 @@ def from_bag(read: Callable[[], T]) -> T:
     """Return the observation of a bag.
 
     Raises:
-        SystemExit: after saying why it cannot be.
+        SystemExit: after reporting why it cannot be read.
     """
     missing = missing_rosbags()
     if missing:
@@ -119,11 +119,11 @@ def observe(  # noqa: PLR0913 (all but two are named)
 ) -> None:
     """Fill the observers from a bag, or else from the running system.
 
-    That is until the time is over or a signal comes. ``show`` is called ``every_s``; who sends
-    joint states is observed on the ``joint_topics``.
+    It ends after ``duration_s`` seconds or with a signal. Calls ``show`` every ``every_s``
+    seconds; observes the senders of joint states on the ``joint_topics``.
 
     Raises:
-        SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
+        SystemExit: after reporting the reason. Silence is one, unless it ``may_be_silent``.
     """
     if bag:
         from_bag(lambda: follow(BagFeed(bag, observers), Stop()))
@@ -151,7 +151,7 @@ def _live_feed(
     ros: RosSettings | None,
     joint_topics: Iterable[str],
 ) -> Feed:
-    """Return the feed that this process can have, set up as the plan says."""
+    """Return the feed for this process, set up as the plan says."""
     if set_up_ros(ros, zenoh_alone=True):
         from tfcompose.tf.live.zenoh_feed import ZenohFeed
 
@@ -164,10 +164,10 @@ def _live_feed(
 def set_up_ros(ros: RosSettings | None = None, *, zenoh_alone: bool = False) -> bool:
     """Set this process up as the plan says.
 
-    Return whether TF is to be read from Zenoh alone, if that is enough.
+    Return whether to read TF from Zenoh without ROS; only if ``zenoh_alone`` allows it.
 
     Raises:
-        SystemExit: after saying why ROS cannot be started so.
+        SystemExit: after reporting why ROS cannot start with these settings.
     """
     os.environ.update(child_environment(os.environ, ros or RosSettings(), own=True))
     if zenoh_alone and reads_zenoh_alone(os.environ):
@@ -179,12 +179,12 @@ def set_up_ros(ros: RosSettings | None = None, *, zenoh_alone: bool = False) -> 
 
 
 def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) -> None:
-    """Say that a signal ended an observation before all publishers can be found.
+    """Report that a signal ended an observation before all publishers could be discovered.
 
-    ``duration_s`` is how long it was to last, None: until the signal.
+    ``duration_s`` is its planned duration; None: until the signal.
 
     Raises:
-        SystemExit: if it saw nothing.
+        SystemExit: if it received nothing.
     """
     if seconds >= min(SURE_S, duration_s or SURE_S):
         return
@@ -203,7 +203,7 @@ def _reject_silent_bag(bag: str, topics: Sequence[Topics]) -> None:
 
 
 def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:
-    """Print that there was no TF."""
+    """Report that there was no TF."""
     message = f"no TF message came on {names_of(topics)} for {seconds:.1f} s"
     notes = [Note(f"looked with {settings_text(os.environ)}")]
     reject([finding("TF811", message, None, notes=notes, help=elsewhere_help(elsewhere))])

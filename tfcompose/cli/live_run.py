@@ -1,8 +1,7 @@
-"""``up`` on a terminal: the launcher runs in its own process, and this one shows it.
+"""``up`` on a terminal: the launcher runs in a child process, and this process shows it.
 
-So what is drawn, however slowly the terminal takes it, never delays the robot; Ctrl-Z stops the
-view alone; and a fault of the view costs the view. The launcher ends with this process, whatever
-ends it.
+A slow terminal therefore never delays the robot, Ctrl-Z stops only the view, and an error in the
+view ends only the view. The launcher ends with this process, whatever ends it.
 """
 
 from __future__ import annotations
@@ -83,9 +82,9 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
 ) -> int:
     """Show the run until its launcher, a child of this process, has ended; return its exit code.
 
-    Signals that end a plan are passed on to it. They are blocked until here, and ``mask`` is the
-    mask before that. The findings of the build and ``warnings`` were printed before, and are
-    behind the view while it is shown: they are the first of its findings and events.
+    Ending signals are forwarded to the launcher. They are blocked so far, and ``mask`` is the mask
+    from before that. The findings of the build and ``warnings`` were already printed, and the view
+    hides them. They are its first findings and events.
     """
     with Signals(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
@@ -106,7 +105,7 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
 
 
 class _LauncherConnection:
-    """A connection to the launcher that is read line by line, without waiting."""
+    """A connection to the launcher, read line by line without blocking."""
 
     def __init__(self, runtime_dir: RuntimeDir) -> None:
         """Connect, or raise OSError."""
@@ -122,7 +121,7 @@ class _LauncherConnection:
         self._socket.sendall(line_of(request))
 
     def lines(self) -> list[bytes]:
-        """Return the lines that came.
+        """Return the received lines.
 
         Raises:
             OSError: if the launcher has hung up.
@@ -296,7 +295,7 @@ class _LiveView:
         self._stale, self._draw_at = True, 0.0
 
     def _follow_log(self, name: str | None) -> None:
-        """Read the process's log from this run's begin, or no more."""
+        """Read the process's log from the start of this run; None: stop reading."""
         folder = self._runtime_dir.logs
         since_s = max(runs_of(folder), default=0.0)
         self._follower = (
@@ -373,7 +372,7 @@ class _LiveView:
             warn(f"the live view failed: {self._fault}; the robot goes on, and Ctrl-C ends it")
 
     def _wait_for_terminal(self) -> None:
-        """Be woken when the terminal takes more, while it is owed something."""
+        """Wake up when the terminal takes more, while output is pending."""
         output = self._screen.output
         if output.owes == self._owing:
             return

@@ -1,4 +1,4 @@
-"""Arguments that several commands have, and how their values are read."""
+"""Arguments shared by several commands, and parsers of their values."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def add_file(parser: ArgumentParser) -> None:
 def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> None:
     """Add the options that are merged over a robot file: --profile, --overlay, --set, args.
 
-    To be called after FILE is added, if that is a word too.
+    Call it after FILE is added, if that is a positional argument.
     """
     parser.add_argument(
         "-p",
@@ -94,10 +94,10 @@ def add_trust(parser: ArgumentParser) -> None:
 
 
 def pairs(arguments: list[str], between: str) -> dict[str, str]:
-    """Return words such as NAME:=VALUE, or NAME=VALUE, by name.
+    """Return arguments such as NAME:=VALUE, or NAME=VALUE, by name.
 
     Raises:
-        SystemExit: after saying that one is not such a word.
+        SystemExit: after reporting one of another form.
     """
     wrong = next(
         (
@@ -165,7 +165,7 @@ def add_tolerance(parser: ArgumentParser) -> None:
 
 
 def tolerance(text: str) -> Offset:
-    """Read a distance, an angle, or both.
+    """Parse a distance, an angle, or both.
 
     Raises:
         ArgumentTypeError: if it is neither.
@@ -193,7 +193,7 @@ def settle_duration(arguments: Namespace, default_s: float, *, is_live: bool) ->
     """Set the default of --for; refuse it without a running tree, as with a recording.
 
     Raises:
-        SystemExit: after saying so.
+        SystemExit: after reporting that.
     """
     if arguments.duration is not None and arguments.bag:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
@@ -206,19 +206,19 @@ def settle_duration(arguments: Namespace, default_s: float, *, is_live: bool) ->
 
 
 def add_format(parser: ArgumentParser, *others: str, text: str = "default: text") -> None:
-    """Add --format: text or one of the others, json unless they are given."""
+    """Add --format: text or one of the others, by default json."""
     parser.add_argument(
         "--format", choices=("text", *(others or ("json",))), default="text", help=text
     )
 
 
 def namespace(text: str) -> str:
-    """Read a namespace as ROS has it, and return it without slashes around.
+    """Parse a ROS namespace, and return it without leading and trailing slashes.
 
     Empty for the global one.
 
     Raises:
-        ArgumentTypeError: if no topic can be below it.
+        ArgumentTypeError: if it is not a valid namespace.
     """
     name = text.strip("/")
     if name in TF_TOPICS or name.endswith(tuple(f"/{topic}" for topic in TF_TOPICS)):
@@ -231,10 +231,10 @@ def namespace(text: str) -> str:
 
 
 def positive(text: str) -> float:
-    """Read a positive number.
+    """Parse a positive number.
 
     Raises:
-        ArgumentTypeError: if it is none.
+        ArgumentTypeError: if it is not one.
     """
     value = _number(text)
     if value is None or value == 0:
@@ -243,10 +243,10 @@ def positive(text: str) -> float:
 
 
 def not_negative(text: str) -> float:
-    """Read a number that is 0 or more.
+    """Parse a number that is 0 or more.
 
     Raises:
-        ArgumentTypeError: if it is none.
+        ArgumentTypeError: if it is not one.
     """
     value = _number(text)
     if value is None:
@@ -255,10 +255,10 @@ def not_negative(text: str) -> float:
 
 
 def count(text: str) -> int:
-    """Read a whole number of 0 or more.
+    """Parse an integer of 0 or more.
 
     Raises:
-        ArgumentTypeError: if it is none.
+        ArgumentTypeError: if it is not one.
     """
     if not text.isascii() or not text.isdigit() or len(text) > 9:  # noqa: PLR2004 (a billion lines)
         raise ArgumentTypeError(f"{text} is not a whole number of 0 or more")

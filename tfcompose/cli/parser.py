@@ -1,8 +1,7 @@
-"""The command ``tfcompose``: the commands of the core, how options are read, and the exit code.
+"""The command ``tfcompose``: the commands of the core, parsing of options, and the exit code.
 
-The parser loads the modules of the core's commands, which therefore import little at the top; a
-command imports what it needs when it runs. Commands of tools are looked up where a command is none
-of the core's: ``tool_commands`` finds them.
+The parser loads the modules of the core's commands, so these import little at the top; a command
+imports what it needs when it runs. Other commands are looked up in ``tool_commands``.
 """
 
 from __future__ import annotations
@@ -99,7 +98,7 @@ def all_commands() -> dict[str, CommandModule]:
 
 
 def find_command(name: str) -> CommandModule | None:
-    """Return a command of the core, or else of a tool; None if there is none of this name."""
+    """Return a command of the core, or else of a tool; None if neither has it."""
     return COMMANDS.get(name) or tool_commands.find(name)
 
 
@@ -204,7 +203,7 @@ def _run_command(name: str, command: CommandModule, argv: list[str]) -> int:
 def parser_of(name: str, columns: int = 0) -> Parser:
     """Return the parser of one command, with the options that tools add to it.
 
-    Its help has that many columns, by default those of the terminal.
+    Its help is ``columns`` wide, by default as the terminal.
 
     Raises:
         KeyError: if there is no such command.
@@ -269,9 +268,9 @@ def _unknown(command: str) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Give a process that was started with closed streams (``>&-``) some that lead nowhere.
+    """Replace streams that were closed at the start (``>&-``), where Python has None.
 
-    Python has None there.
+    The replacements discard everything.
     """
     for fd, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         if getattr(sys, name) is not None:

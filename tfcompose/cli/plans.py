@@ -29,18 +29,12 @@ PLAN = "plan.json"
 
 
 def is_plan(file: str) -> bool:
-    """Return whether the file that a command was given is a built plan.
-
-    Else it is a robot file.
-    """
+    """Return whether the given file is a built plan, not a robot file."""
     return file.endswith(".json")
 
 
 def in_folder(file: str) -> str:
-    """Return the plan in the folder that a command was given, as ``build`` writes one.
-
-    Else the file as it is.
-    """
+    """Return the plan in the given folder, as ``build`` writes one, else the file itself."""
     plan = Path(file) / PLAN
     return str(plan) if is_file(plan) else file
 
@@ -49,7 +43,7 @@ def read_built_plan(file: Path) -> Plan:
     """Return the plan in the file.
 
     Raises:
-        SystemExit: after saying what is wrong with it.
+        SystemExit: after reporting its errors.
     """
     try:
         return read_plan(read_text(str(file)), str(file))
@@ -58,10 +52,10 @@ def read_built_plan(file: Path) -> Plan:
 
 
 def refuse_variant(arguments: Namespace, *more: str) -> None:
-    """Refuse --profile, --overlay, --set and arguments with a plan that is already built.
+    """Refuse --profile, --overlay, --set and arguments with a built plan.
 
     Raises:
-        SystemExit: after saying so.
+        SystemExit: after reporting that.
     """
     if (
         arguments.profiles
@@ -91,7 +85,7 @@ def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span
     Places are by child; a built plan has none.
 
     Raises:
-        SystemExit: after saying what cannot be read, or is wrong.
+        SystemExit: after reporting unreadable files and errors.
     """
     file = in_folder(file)
     if is_plan(file):
@@ -108,7 +102,7 @@ def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
     """Return the plan for this host, with the guard options of the command line.
 
     Raises:
-        SystemExit: after saying that there is no such share.
+        SystemExit: after reporting that there is no such share.
     """
     if arguments.guard:
         plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
@@ -126,10 +120,10 @@ def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
 
 
 def host_share(plan: Plan, host: str | None, here: str) -> Plan:
-    """Return the share of the host that is named, or of ``here``.
+    """Return the share of the named host, or of ``here``.
 
     Raises:
-        SystemExit: after saying that there is none.
+        SystemExit: after reporting that there is none.
     """
     share = share_of(plan, host, here)
     if not isinstance(share, Plan):
@@ -142,12 +136,12 @@ def copy_plan(
 ) -> Path:
     """Copy the plan and its files to the run's folder; return the copy.
 
-    A build then does not reach into a run. Meshes stay where they are: descriptions address them
-    from the copy too. ``alone`` removes the copies of earlier runs; ``build_dir`` is where paths
-    begin, if not beside the plan.
+    The copy keeps later builds from affecting the run. Meshes stay at their place: the copied
+    descriptions address them there. ``alone`` removes the copies of earlier runs. Relative paths
+    start at ``build_dir``, by default at the plan.
 
     Raises:
-        SystemExit: after saying that it cannot be copied.
+        SystemExit: after reporting that it cannot be copied.
     """
     parts = {PLAN: write_plan(plan).encode()}
     descriptions = {
@@ -181,9 +175,9 @@ def copy_plan(
 
 
 def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
-    """Write the files, each at once.
+    """Write the files, each atomically.
 
-    Another ``up`` may write the same, and the run's processes read them.
+    Another ``up`` may write the same ones while the run's processes read them.
     """
     for name, data in parts.items():
         file = folder / name
@@ -194,9 +188,9 @@ def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
 
 
 def _with_absolute_addresses(urdf: bytes, folder: Path) -> bytes:
-    """Return a description with whole addresses.
+    """Return a description with absolute addresses.
 
-    Bytes that are no text stay, for their reader to refuse.
+    Bytes that are not text stay, and their reader rejects them.
     """
     try:
         return with_absolute_addresses(urdf.decode("utf-8"), folder).encode()

@@ -1,7 +1,4 @@
-"""One preset of a sensor, or of a node that publishes TF.
-
-As plain data, and as a page for people.
-"""
+"""One preset of a sensor, or of a node that publishes TF, as data and as a page."""
 
 from __future__ import annotations
 
@@ -40,7 +37,7 @@ NAME = "NAME"
 def facts(name: str, library: Library) -> dict[str, Any]:
     """Return the preset, with the default variant of each of its options, as plain data.
 
-    What is unknown is null.
+    Unknown values are null.
     """
     plain = library.get(name)
     defaults = {
@@ -78,7 +75,7 @@ def facts(name: str, library: Library) -> dict[str, Any]:
 
 
 def text(preset: dict[str, Any], columns: int | None = None) -> str:
-    """Return the page, with lines of at most so many columns."""
+    """Return the page, with lines of at most ``columns`` columns."""
     parts = [
         f"{preset['name']}  {preset['vendor']} {preset['model']},"  # noqa: ISC004
         f" {preset['kind']}\n{preset['about']}"
@@ -101,9 +98,9 @@ def text(preset: dict[str, Any], columns: int | None = None) -> str:
 
 
 def _fit_page(page: str, columns: int | None) -> str:
-    """Return the page with lines of at most so many columns.
+    """Return the page with lines of at most ``columns`` columns.
 
-    What has no room goes on below, by cells.
+    Rows of cells that are too wide continue on the next line, cell by cell.
     """
     if columns is None:
         return page
@@ -357,10 +354,7 @@ def _topic(topic: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _degrees(sector: Sequence[float]) -> str:
-    """Return a sector in degrees.
-
-    Its whole angle where it is symmetric, else from where to where.
-    """
+    """Return a sector in degrees: the full angle of a symmetric one, else its limits."""
     start, end = (round(math.degrees(angle), 3) for angle in sector)
     return f"{number(2 * end)} deg" if start == -end else f"{number(start)} to {number(end)} deg"
 
@@ -390,7 +384,7 @@ def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
 def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
     """Return the sources of the optics' values.
 
-    Each document once, with what it is and what it gives.
+    Each document once, with its kind and the values it supplies.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for optics in streams:
@@ -432,7 +426,7 @@ def node_rows() -> list[dict[str, str]]:
 def node_facts(name: str) -> dict[str, Any]:
     """Return the preset as plain data.
 
-    The frames of a claim have the names that they have by default.
+    The frames of a claim have their default names.
     """
     preset = node_preset(name)
     usual = {role: frame.default for role, frame in preset.frames.items()}
@@ -483,7 +477,7 @@ def _claim(claim: ClaimSpec, usual: Mapping[str, str]) -> dict[str, Any]:
 
 
 def node_text(preset: dict[str, Any], columns: int | None = None) -> str:
-    """Return the page, with lines of at most so many columns."""
+    """Return the page, with lines of at most ``columns`` columns."""
     parts = [
         f"{preset['name']}  the node {preset['node']} of {preset['package']}\n{preset['about']}"
     ]
@@ -522,5 +516,5 @@ def _role_text(frame: dict[str, Any]) -> str:
 
 
 def _parameters(values: dict[str, Any]) -> str:
-    """Return parameters as ROS takes them: 0.0 is another type than 0."""
+    """Return parameters as ROS parses them: 0.0 and 0 have different types."""
     return _pairs({key: parameter(value) for key, value in values.items()})

@@ -1,4 +1,4 @@
-"""The table of a robot's processes, as ``ps`` and the live view of ``up`` show it."""
+"""Table of a robot's processes in ``ps`` and the live view of ``up``."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _colour(column: int, text: str) -> str:
 
 
 def uptime(seconds: float) -> str:
-    """Return how long something has run: 42 s, 3:07 min or 12:30 h."""
+    """Return an uptime for display: 42 s, 3:07 min or 12:30 h."""
     total_s = int(seconds)
     if total_s < 60:  # noqa: PLR2004 (seconds of a minute)
         return f"{total_s} s"

@@ -1,4 +1,4 @@
-"""Files that the command line names, as text; and lines of files as findings quote them."""
+"""Text of files named on the command line, and file lines quoted in findings."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def read_text(path: str) -> str:
     """Return the file's text; ``-`` is standard input, which is read once.
 
     Raises:
-        RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too
-            large.
+        RejectedError: with one TF001 or TF008 finding, if it cannot be read, is not text, or is
+            too large.
     """
     data = _standard_input() if path == STDIN else read_bytes(path)
     if len(data) > MOST_BYTES:
@@ -48,7 +48,7 @@ def _standard_input() -> bytes:
 def _decode_as_declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
     """Return the text of a URDF in the encoding that it declares.
 
-    Xacro reads UTF-8 whatever a file says.
+    Xacro reads UTF-8 whatever a file declares.
     """
     is_urdf = path.endswith(".urdf")
     declared = is_urdf and re.match(
@@ -71,7 +71,7 @@ _withheld: set[str] = set()
 
 
 def quote(file: str) -> None:
-    """Let ``line_of`` quote a file, whatever it holds.
+    """Let ``line_of`` quote a file, whatever it contains.
 
     The user named it for a command that reads such files.
     """
@@ -79,7 +79,7 @@ def quote(file: str) -> None:
 
 
 def withhold(file: str) -> None:
-    """Let ``line_of`` quote nothing of a file, which may not be read."""
+    """Keep ``line_of`` from quoting a file that must not be read."""
     _withheld.add(file)
 
 
@@ -95,7 +95,7 @@ def _lines(file: str) -> list[str]:
 def _is_of_a_robot(text: str) -> bool:
     """Return whether a text is about robots.
 
-    Others can hold passwords, and lint's output may be public.
+    Other files can contain passwords, and lint's output may be public.
     """
     if text.lstrip().startswith("<"):
         return _XML.search(text) is not None

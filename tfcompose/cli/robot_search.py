@@ -28,8 +28,8 @@ _OF_KERNEL = frozenset({PROC, "/sys", "/dev"})
 def robots_in(name: str) -> list[str]:
     """Return the file itself, or the robot files below a folder.
 
-    Those are YAML files with a line that begins with tfcompose:. Folders that hold no files of
-    people, and those on other file systems, as ``find -xdev`` has them, are left out.
+    Robot files are YAML files with a line that begins with tfcompose:. The search skips hidden
+    folders, those of the kernel, and other file systems (as ``find -xdev`` does).
     """
     from tfcompose.foundation.reading import is_file
 
@@ -49,7 +49,7 @@ def robots_in(name: str) -> list[str]:
 
 
 class _Progress:
-    """Prints once what a long search is doing."""
+    """Prints once that a search takes long."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -57,7 +57,7 @@ class _Progress:
         self._files = 0
 
     def count_files(self, count: int) -> None:
-        """Count YAML files that were looked at."""
+        """Count YAML files that were read."""
         self._files += count
         if time.monotonic() >= self._say_at:
             self._say_at = float("inf")
@@ -68,7 +68,7 @@ class _Progress:
 
 
 def _device(folder: str) -> int:
-    """Return the file system of a folder, 0 if it cannot be looked at."""
+    """Return the file system of a folder, 0 if it cannot be accessed."""
     try:
         return os.stat(folder).st_dev  # noqa: PTH116 (as os.walk has it)
     except (OSError, ValueError):
@@ -76,12 +76,12 @@ def _device(folder: str) -> int:
 
 
 def _is_searched(folder: str, device: int) -> bool:
-    """Return whether a folder is on this file system and holds files of people."""
+    """Return whether a folder is on this file system and is not the kernel's."""
     return os.path.realpath(folder) not in _OF_KERNEL and _device(folder) == device
 
 
 def is_robot(file: str) -> bool:
-    """Return whether it is one, or cannot be read: its own lint says why."""
+    """Return whether it is a robot file, or unreadable: lint reports the reason."""
     from tfcompose.foundation.findings import RejectedError
     from tfcompose.foundation.reading import read_bytes
 

@@ -18,7 +18,7 @@ def ros_arguments(argv: Sequence[str]) -> RosArguments:
     """Return the arguments after ``--ros-args``.
 
     Raises:
-        SystemExit: after saying that one is not for a whole robot.
+        SystemExit: after reporting one that cannot apply to a whole robot.
     """
     arguments, rest = RosArguments(), list(argv)
     while rest:

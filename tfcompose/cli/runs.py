@@ -57,9 +57,9 @@ def running() -> list[tuple[RuntimeDir, Holder]]:
 
 
 def is_meant(runtime_dir: RuntimeDir, name: str) -> bool:
-    """Return whether this name means the robot.
+    """Return whether this name selects the robot.
 
-    Its own, one without the domain, or without a host's name too.
+    It may be the full name, or lack the domain, and also the host.
     """
     return name in {runtime_dir.name, runtime_dir.share, runtime_dir.robot}
 
@@ -67,13 +67,13 @@ def is_meant(runtime_dir: RuntimeDir, name: str) -> bool:
 def chosen_run(
     name: str | None, command: str, *, among: Callable[[], list[RuntimeDir]] | None = None
 ) -> RuntimeDir:
-    """Return the place of the robot that is meant: of those that run, or ``among`` others.
+    """Return the selected robot: one that runs, or one ``among`` others.
 
     Without a name that is the one in this shell's ROS domain, else the one of the ``robot.yaml``
-    here; ``command`` is what the user typed, to be shown with the name of another.
+    here. ``command`` is the user's command, for an example with another name.
 
     Raises:
-        SystemExit: after saying that there is none, or which there are.
+        SystemExit: after reporting that there is none, or the candidates.
     """
     try:
         known = among() if among else [runtime_dir for runtime_dir, _ in running()]
@@ -107,7 +107,7 @@ def chosen_run(
 def in_scope(places: list[RuntimeDir]) -> list[RuntimeDir]:
     """Return the robots in this shell's ROS domain.
 
-    Where there is none, those that the ``robot.yaml`` here names.
+    If there are none, return those that the ``robot.yaml`` here names.
     """
     found = [runtime_dir for runtime_dir in places if runtime_dir.domain == domain_of(os.environ)]
     robot = _robot_here() if places and not found else None
@@ -115,7 +115,7 @@ def in_scope(places: list[RuntimeDir]) -> list[RuntimeDir]:
 
 
 def _robot_here() -> str | None:
-    """Return the name that the robot file of this folder gives, if it can be read."""
+    """Return the name in this folder's robot file, if it can be read."""
     from tfcompose.spec.load import load
 
     try:
@@ -126,7 +126,7 @@ def _robot_here() -> str | None:
 
 
 def request(runtime_dir: RuntimeDir, question: Request, answer: type[A]) -> A | None:
-    """Return the launcher's answer, or None after saying why there is none, or that it refuses."""
+    """Return the launcher's answer, or None after reporting that there is none, or a refusal."""
     try:
         return ask(runtime_dir, question, answer)
     except RequestRefusedError as error:
@@ -137,7 +137,7 @@ def request(runtime_dir: RuntimeDir, question: Request, answer: type[A]) -> A | 
 
 
 def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
-    """Have the launcher do it with each of the named processes; return the exit code."""
+    """Have the launcher apply the verb to each named process; return the exit code."""
     files = [name for name in arguments.name if name.endswith((".yaml", ".yml"))]
     if files:
         advice = "down stops a robot" if verb == "stop" else f"up {files[0]} starts a robot"
@@ -159,12 +159,12 @@ def notices(
 ) -> Iterator[tuple[Notice, float]]:
     """Yield past and new notices of the launcher with their times, until it ends.
 
-    ``output`` is where the caller prints them: once nobody reads it any more, the notices end,
-    even if none comes.
+    ``output`` is where the caller prints them: once its reader is gone, the notices end, even if
+    none comes.
 
     Raises:
-        OSError: if it cannot be reached; TimeoutError if the time is over; BrokenPipeError if
-            nobody reads.
+        OSError: if the launcher cannot be reached; TimeoutError if the time is over;
+            BrokenPipeError if the reader is gone.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(runtime_dir) as connection:
@@ -195,9 +195,8 @@ def wait_until_ready(
 ) -> int:
     """Wait until every process is ready and every edge live.
 
-    ``without_errors``: and until the guard sees no error.
-
-    0 then, and 1 after saying why that did not come.
+    ``without_errors`` waits also until the guard sees no error. Return 0, or 1 after reporting why
+    that did not happen.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     while True:
@@ -219,7 +218,7 @@ def _errors(status: RobotStatus) -> list[Finding]:
 
 
 def print_missing(runtime_dir: RuntimeDir, timeout_s: float) -> None:
-    """Complain about each process that is not ready, and each edge that is not live."""
+    """Report each process that is not ready, and each edge that is not live."""
     try:
         status = ask(runtime_dir, StatusRequest(), RobotStatus)
     except OSError as error:
@@ -244,7 +243,7 @@ def print_missing(runtime_dir: RuntimeDir, timeout_s: float) -> None:
 def _why_not_ready(process: ProcessStatus) -> str:
     """Return the conditions that its start waits for.
 
-    Else its state, what it is without, and what is seen there.
+    For a started process: its state, its missing conditions, and the last observation.
     """
     if process.state == "stopped" and process.waits:
         return process.waits
@@ -259,7 +258,7 @@ def _why_not_ready(process: ProcessStatus) -> str:
 
 
 def since(holder: Holder) -> str:
-    """Return since when, in local time: 14:03:27, with the date if that is not today."""
+    """Return the start in local time: 14:03:27, with the date if that is not today."""
     at, today = time.localtime(holder.since), time.localtime()
     form = "%H:%M:%S" if at[:3] == today[:3] else "%Y-%m-%d %H:%M:%S"
     return time.strftime(form, at)
@@ -285,7 +284,7 @@ def find_hidden_run(runtime_dir: RuntimeDir) -> str | None:
 
 
 def warnings_before_start(runtime_dir: RuntimeDir, plan: Plan, run_id: str) -> list[str]:
-    """Return obstacles to the start of a robot, a sentence each."""
+    """Return obstacles to the start of a robot, one sentence each."""
     return [
         *other_domains(runtime_dir),
         *_left_behind(runtime_dir, run_id),
@@ -296,7 +295,7 @@ def warnings_before_start(runtime_dir: RuntimeDir, plan: Plan, run_id: str) -> l
 def _neighbours(runtime_dir: RuntimeDir, plan: Plan) -> Iterator[str]:
     """Name other robots that run in the domain on the same TF topics.
 
-    Each guard would report the other's.
+    Each guard would report the other's nodes.
     """
     found = [
         (other.robot, holder)
@@ -316,7 +315,7 @@ def _neighbours(runtime_dir: RuntimeDir, plan: Plan) -> Iterator[str]:
 
 
 def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
-    """Return whether the plan that runs there has TF topics of this one."""
+    """Return whether the plan that runs there shares TF topics with this one."""
     running_plan = plan_of_run(other)
     return running_plan is not None and not judged_topics(plan).isdisjoint(
         judged_topics(running_plan)
@@ -324,7 +323,7 @@ def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
 
 
 def other_domains(runtime_dir: RuntimeDir) -> Iterator[str]:
-    """Name runs of the same robot in other domains, such as before a domain_id changed."""
+    """Name runs of the same robot in other domains, as after a change of domain_id."""
     for other, holder in running():
         if other.share == runtime_dir.share and other.domain != runtime_dir.domain:
             yield (
@@ -336,7 +335,7 @@ def other_domains(runtime_dir: RuntimeDir) -> Iterator[str]:
 def plan_file(runtime_dir: RuntimeDir) -> Path:
     """Return the copy of the plan that a robot runs.
 
-    Raises OSError or ValueError if it is not there any more.
+    Raises OSError or ValueError if it is gone.
     """
     return max(runtime_dir.plan_folders(), key=lambda folder: folder.stat().st_mtime) / "plan.json"
 
@@ -350,9 +349,9 @@ def plan_of_run(runtime_dir: RuntimeDir) -> Plan | None:
 
 
 def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
-    """Return the one robot that runs in this shell's ROS domain, and its plan.
+    """Return the only robot that runs in this shell's ROS domain, and its plan.
 
-    None for none, or for several.
+    None if there is none, or several.
     """
     try:
         found = [
@@ -367,7 +366,7 @@ def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
 
 
 def plan_of_domain() -> Plan | None:
-    """Return the plan of the one robot that runs in this shell's ROS domain, after saying so.
+    """Return the plan of the only robot in this shell's ROS domain, and print its name.
 
     None if there is none.
     """
@@ -379,7 +378,7 @@ def plan_of_domain() -> Plan | None:
 
 
 def _left_behind(runtime_dir: RuntimeDir, run_id: str) -> Iterator[str]:
-    """Name processes of earlier runs that are still there."""
+    """Name processes of earlier runs that still run."""
     found = [
         leftover
         for leftover in leftovers(f"{runtime_dir.name}:")

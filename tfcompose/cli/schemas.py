@@ -1,4 +1,4 @@
-"""JSON Schemas of everything that users write, and of plan.json."""
+"""JSON Schemas of all files that users write, and of plan.json."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ WITHOUT_REFERENCE = {
 
 
 def languages_with_reference() -> list[str]:
-    """Return the languages whose keys are described for people."""
+    """Return the languages whose keys have a reference for users."""
     return [language for language in languages() if language not in WITHOUT_REFERENCE]
 
 
 def schema_text(language: str) -> str:
-    """Return the schema as the files under ``schemas/`` hold it."""
+    """Return the schema as in the files under ``schemas/``."""
     return json.dumps(_schema(language), indent=2, ensure_ascii=False) + "\n"
 
 

@@ -1,7 +1,7 @@
 """Screen that redraws its changed rows in place on a terminal.
 
-A drawing sends the rows that changed since the last one: a view that changes 20 times a second
-costs a slow link a few rows, and not a screen, each time.
+A drawing sends only the rows that changed since the last one. A view that changes 20 times a
+second then sends a few rows over a slow link each time, not a screen.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _OWN_SCREEN = "\033[?25h\033[?1049l"
 
 
 class Rows:
-    """Rows of text that are drawn again in their place.
+    """Rows of text that are redrawn in place.
 
-    The cursor stands on the last one between drawings.
+    The cursor is on the last one between drawings.
     """
 
     def __init__(self) -> None:
@@ -58,7 +58,7 @@ class Rows:
 
 
 class LiveLines:
-    """Some lines at the end of a terminal's output, which the next drawing replaces."""
+    """Lines at the end of a terminal's output that the next drawing replaces."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -68,7 +68,7 @@ class LiveLines:
     def draw(self, lines: Sequence[str]) -> None:
         """Redraw the lines in place.
 
-        Those that the terminal has no room for are counted only.
+        Lines that do not fit on the terminal are only counted.
         """
         columns, rows = size_of(self._stream.fileno())
         room = max(rows - 1, 2)
@@ -94,10 +94,10 @@ def _fit_line(line: str, width: int) -> str:
 
 
 class Screen:
-    """A terminal whose other screen is drawn on, from the ``with`` block's begin to its end.
+    """The alternate screen of a terminal, during the ``with`` block.
 
-    Ctrl-C and Ctrl-Z remain signals; Ctrl-S is a key like others. A terminal that takes nothing is
-    not waited for. What cannot be written since the terminal has gone raises OSError.
+    Ctrl-C and Ctrl-Z remain signals; Ctrl-S is an ordinary key. It never blocks on a terminal that
+    takes no output. It raises OSError if the terminal is gone.
     """
 
     def __init__(self, keys_fd: int, output: NonBlockingOutput) -> None:
@@ -116,7 +116,7 @@ class Screen:
         self.leave()
 
     def enter(self) -> None:
-        """Go to the other screen, and take keys without Enter and without showing them."""
+        """Switch to the alternate screen; read keys without Enter and without echo."""
         settings = termios.tcgetattr(self.fd)
         settings[0] &= ~termios.IXON
         settings[3] &= ~(termios.ICANON | termios.ECHO)
@@ -129,11 +129,11 @@ class Screen:
         self.redraw()
 
     def redraw(self) -> None:
-        """Have the next drawing send all rows: others may have written to the terminal."""
+        """Send all rows with the next drawing: others may have written to the terminal."""
         self._size = (0, 0)
 
     def leave(self) -> None:
-        """Restore the terminal, unless it has gone."""
+        """Restore the terminal, unless it is gone."""
         if not self._is_shown:
             return
         self._is_shown = False

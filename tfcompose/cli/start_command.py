@@ -1,4 +1,4 @@
-"""Commands that start a robot, or its guard alone: their arguments, and the way to the start."""
+"""Commands that start a robot, or only its guard: their arguments, and the steps to the start."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def add_start_arguments(parser: ArgumentParser, *, guard_alone: bool = False) -> None:
-    """Add the arguments of a command that starts a robot, or its guard alone."""
+    """Add the arguments of a command that starts a robot, or only its guard."""
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
     )
@@ -141,10 +141,10 @@ def build_and_start(arguments: Namespace) -> int:
 
 
 def _open_events(path: str | None) -> EventStream | None:
-    """Return the stream to a file or named pipe, None without one.
+    """Return the stream to a file or named pipe; None if there is no path.
 
     Raises:
-        SystemExit: after saying that it cannot be opened.
+        SystemExit: after reporting that it cannot be opened.
     """
     if path is None:
         return None

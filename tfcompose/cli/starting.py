@@ -1,8 +1,6 @@
-"""Start of a robot on this machine by ``up``.
+"""Start of a robot on this machine by ``up``: checks, runtime directory, launcher.
 
-It checks all that the plan needs, and then makes the runtime directory.
-
-With ``-d`` the launcher goes on in the background, and the command follows it until the robot is
+With ``-d`` the launcher continues in the background, and the command follows it until the robot is
 up.
 """
 
@@ -85,7 +83,7 @@ if TYPE_CHECKING:
 
 
 def load_forker(arguments: Namespace) -> Forker | None:
-    """Load what tfcompose's own processes run; None where ROS does not load, or nothing starts.
+    """Load the modules of own processes; None if ROS does not load, or nothing starts.
 
     ROS ends a process that imports it without the middleware that the environment names.
     """
@@ -104,12 +102,10 @@ def start(
     built_with: Sequence[Finding] = (),
     events: EventStream | None = None,
 ) -> int:
-    """Check all that the plan in the file needs, and start it.
+    """Check all that the plan in the file needs, and start it; return ``up``'s exit code.
 
-    Return the exit code as ``up`` does.
-
-    ``forker`` has loaded what tfcompose's own processes run. ``built_with`` are the warnings of
-    the plan's build, which were printed. ``events`` gets each notice.
+    ``forker`` has loaded the modules of tfcompose's own processes. ``built_with`` are the warnings
+    of the plan's build, which were printed. ``events`` receives each notice.
     """
     plan = plan_to_start(read_built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
@@ -157,7 +153,7 @@ def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
     """Print warnings, and exit if something prevents the start.
 
     Raises:
-        SystemExit: after saying all of it.
+        SystemExit: after reporting all obstacles.
     """
     trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True), plan.ros)
     findings = (
@@ -199,9 +195,9 @@ def _run(
 
 
 def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespace) -> int:
-    """Bring the running robot to the plan.
+    """Switch the running robot to the plan.
 
-    Exit code 0, 1 where it runs as it is and was to be started here.
+    Exit code 0; 1 if nothing changed although the command was to start it here.
     """
     holder = runtime_dir.holder()
     who = (
@@ -233,7 +229,7 @@ def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespac
 
 
 def _with_profiles(finding: Finding, arguments: Namespace) -> Finding:
-    """Return the finding; if programs are missing, with the profiles that can do without them."""
+    """Return the finding; if programs are missing, with profiles that do not need them."""
     if finding.code != "TF810" or is_plan(arguments.file):
         return finding
     profiles = _profiles_that_start(arguments)
@@ -244,9 +240,9 @@ def _with_profiles(finding: Finding, arguments: Namespace) -> Finding:
 
 
 def _profiles_that_start(arguments: Namespace) -> str:
-    """Return the profiles with which every program exists, as ``a or b``; empty if there are none.
+    """Return the profiles for which every program exists, as ``a or b``; empty if there are none.
 
-    They replace those requested, or else come on top of them: ``sim --profile a``.
+    They replace the requested ones, or else are added to them: ``sim --profile a``.
     """
     from tfcompose.spec.language import profiles_in, with_includes
     from tfcompose.spec.load import load
@@ -282,9 +278,9 @@ def _starts_with(profiles: Sequence[str], arguments: Namespace) -> bool:
 def _detach(
     plan: Plan, runtime_dir: RuntimeDir, lock: Lock, session: RunSession, arguments: Namespace
 ) -> int:
-    """Start the launcher as a separate process; return 0 when all processes are started, or ready.
+    """Start the launcher as a separate process; return 0 once all processes started, or are ready.
 
-    1 when it is not.
+    1 if they do not.
     """
     if goes_with_logout(runtime_dir):
         user = user_name()
@@ -306,7 +302,7 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
 ) -> int:
     """Start the launcher as a separate process, and return its process id.
 
-    With a ``mask`` of signals, which holds there, it ends with this process.
+    With a ``mask``, the signal mask to restore there, it ends with this process.
     """
     sys.stdout.flush()
     sys.stderr.flush()

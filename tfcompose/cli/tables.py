@@ -1,11 +1,9 @@
-"""Tables of text: as wide as they are for files and pipes.
+"""Tables of text: unfitted for files and pipes, fitted and coloured for a terminal.
 
-For a terminal fitted and coloured.
-
-A pipe gets the same bytes whatever the terminal is. On a narrow terminal the columns that matter
-least are left out, and names are shortened after their first third: their ends tell them apart. Of
-an edge the parent is shortened before the child, which no other edge has. rich would cut numbers
-there, too.
+A pipe gets the same bytes whatever the terminal is. On a narrow terminal the least important
+columns are dropped. Names are shortened after their first third, because their ends distinguish
+them. An edge's parent is shortened before its child, which identifies the edge. rich would shorten
+numbers, too.
 """
 
 from __future__ import annotations
@@ -21,17 +19,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """How the columns of a table are laid out; they go by their numbers, from 0.
+    """Layout of a table's columns, by index from 0."""
 
-    Columns in ``right`` are aligned to the right. To fit a width, those in ``spare`` are left out,
-    in their order, until those in ``least`` can be shortened enough; these are shortened in their
-    order, to no fewer characters than it says. ``colour`` returns the colour of a cell, or
-    nothing, for its column and text.
-    """
-
+    #: Columns aligned to the right.
     right: frozenset[int] = frozenset()
+    #: Columns to drop, in this order, until those in ``least`` can be shortened enough to fit.
     spare: tuple[int, ...] = ()
+    #: Columns to shorten, in this order, with their minimum width in characters.
     least: Mapping[int, int] = field(default_factory=dict)
+    #: Returns the colour of a cell from its column and text; empty: none.
     colour: Callable[[int, str], str] | None = None
 
     def lines(
@@ -42,7 +38,7 @@ class Table:
         coloured: bool = False,
         indent: str = "",
     ) -> list[str]:
-        """Return a line for each row, narrower than ``width`` where possible.
+        """Return a line for each row, narrower than ``width`` if possible.
 
         A terminal's last column stays free.
         """
@@ -81,17 +77,15 @@ class Table:
 
 
 def _excess(widths: dict[int, int], width: int) -> int:
-    """Return how many characters are too many."""
+    """Return by how many characters the columns are too wide."""
     return sum(widths.values()) + 2 * (len(widths) - 1) - width
 
 
 def shorten(text: str, width: int, *, at_end: bool = False) -> str:
-    """Return the text in so many characters.
+    """Return the text in ``width`` characters, with an ellipsis after its first third.
 
-    With an ellipsis at its end, or after its first third.
-
-    Of an edge, ``parent → child``, that is the first third of the parent; of the child alone where
-    there is no room.
+    ``at_end`` puts it at the end. An edge, ``parent → child``, is shortened after the first third
+    of the parent, or if there is no room for that, of the child alone.
     """
     if len(text) <= width:
         return text

@@ -38,7 +38,7 @@ _COLOUR = re.compile(r"\033\[[0-9;:]*m")
 
 
 def warn(message: str) -> None:
-    """Print one sentence to stderr; names in it come from files and the command line."""
+    """Print one sentence to stderr, with control characters in names escaped."""
     text = "\n".join(map(printable, message.split("\n")))
     sys.stderr.write(f"tfcompose: {text}\n")
 
@@ -60,9 +60,9 @@ MOST_OF_ONE_CODE = 10
 def print_findings(
     findings: Sequence[Finding], stream: TextIO, *, most: int | None = None
 ) -> None:
-    """Print findings for people, with the lines that they are about.
+    """Print findings with the lines that they are about.
 
-    ``most`` of one code are printed of a file, and how many more there are; None: all.
+    At most ``most`` of one code per file, with the number of the others; None: all.
     """
     from tfcompose.cli.reading import line_of
 
@@ -86,7 +86,7 @@ def reject(findings: Sequence[Finding], code: int | None = None) -> NoReturn:
     """Print findings to stderr and end the command.
 
     Raises:
-        SystemExit: with the exit code, unless given that of ``exit_code_of``.
+        SystemExit: with the given exit code, else that of ``exit_code_of``.
     """
     print_findings(findings, sys.stderr, most=MOST_OF_ONE_CODE)
     raise SystemExit(code or exit_code_of(findings))
@@ -108,10 +108,7 @@ def is_coloured(stream: TextIO) -> bool:
 
 
 def can_redraw(stream: TextIO) -> bool:
-    """Return whether lines can be drawn again in their place.
-
-    On a terminal that moves its cursor.
-    """
+    """Return whether lines can be redrawn in place: on a terminal that can move its cursor."""
     return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
@@ -127,8 +124,8 @@ def code_page(code: str) -> str:
 def code_addresses(stream: TextIO) -> CodeAddress:
     """Return the function from a code to the address of its page, for links on a terminal.
 
-    The pages are at ``$TFCOMPOSE_DOCS``, a URL or a folder, or at the project's own address. There
-    are no links into a file or a pipe, with NO_COLOR, or to a page that a folder does not have.
+    The pages are at ``$TFCOMPOSE_DOCS``, a URL or a folder, or at the project's own address.
+    Files, pipes, NO_COLOR and pages missing from a folder get no links.
     """
     docs = os.environ.get("TFCOMPOSE_DOCS") or DOCUMENTATION_URL
     if not docs or os.environ.get("NO_COLOR") or not can_redraw(stream):
@@ -152,10 +149,7 @@ _URL_SAFE = ":/?#[]@!$&'()*+,;=%~"
 
 
 def table_width(stream: TextIO) -> int | None:
-    """Return the width that tables are fitted to.
-
-    The terminal's, or None into a file or a pipe.
-    """
+    """Return the terminal's width, to fit tables; None for a file or a pipe."""
     return size_of(stream.fileno())[0] if can_redraw(stream) else None
 
 
@@ -176,13 +170,13 @@ def printable(text: str) -> str:
 def plain(text: str) -> str:
     """Return the text without control sequences.
 
-    Other characters that cannot be seen are marked.
+    Other invisible characters are marked.
     """
     return "".join(map(_mark, _SEQUENCE.split(text)[::2]))
 
 
 def keep_colours(text: str) -> str:
-    """Return the text with its colours, which end with it, and without other control sequences."""
+    """Return the text with its colours, reset at the end, and no other control sequences."""
     pieces = _SEQUENCE.split(text)
     if len(pieces) == 1:
         return _mark(text)
@@ -199,7 +193,7 @@ def _mark(text: str) -> str:
 def has_reader(stream: TextIO) -> bool:
     """Return whether the stream still has a reader.
 
-    ``tfcompose logs -f | head -1`` ends that.
+    In ``tfcompose logs -f | head -1`` it is gone after one line.
     """
     return _first_ready(stream, None, 0) != stream
 
@@ -207,9 +201,7 @@ def has_reader(stream: TextIO) -> bool:
 def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
     """Wait until there is input, or the stream has lost its reader.
 
-    Return whether it is read.
-
-    The connection's timeout limits the wait.
+    Return whether the stream has a reader. The connection's timeout limits the wait.
     """
     timeout_s = connection.gettimeout()
     return (

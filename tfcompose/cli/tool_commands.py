@@ -1,7 +1,7 @@
-"""Commands and options of tools, as the parser, the help and the completion have them.
+"""Commands and options of tools, for the parser, the help and the completion.
 
-Tools that ship are looked up first. Those of other packages are looked up only where a command or
-an option is still unknown, and for the help.
+Built-in tools are looked up first. Those of other packages are looked up only if a command or an
+option is still unknown, and for the help.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ToolCommand:
 
     @property
     def __doc__(self) -> str | None:  # type: ignore[override]
-        """The help, which is the module's docstring."""
+        """The help: the module's docstring."""
         text: str | None = self._module().__doc__
         return text
 
@@ -53,13 +53,13 @@ class ToolOption:
         self.option = option
 
     def arguments(self, parser: ArgumentParser) -> None:
-        """Add them."""
+        """Add the options."""
         _load_module(self.tool, self.option.module).arguments(parser)
 
     def run(self, command: str, arguments: Namespace) -> int | None:
-        """Run the command their way, and return the exit code.
+        """Run the command with these options, and return the exit code.
 
-        None where it is to run as usual.
+        None: the command should run as usual.
         """
         code: int | None = _load_module(self.tool, self.option.module).run(command, arguments)
         return code
@@ -122,7 +122,7 @@ _SYNONYMS = {
 
 
 def instead_of(name: str) -> str:
-    """Return advice for a word that other programs have for a command; empty if none has."""
+    """Return advice for another program's name of a command; empty if there is none."""
     of_tools = (pair for _, command in installed_tools().commands() for pair in command.synonyms)
     command = (_SYNONYMS | dict(of_tools)).get(name)
     return f"that is tfcompose {command}" if command else ""
@@ -131,7 +131,7 @@ def instead_of(name: str) -> str:
 def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOption]:
     """Add the options of tools to a command, if an unknown option is used.
 
-    Return what was added.
+    Return the added options.
     """
     added: list[ToolOption] = []
     for toolset in (shipped_tools, installed_tools):
@@ -164,10 +164,10 @@ def _add(
 
 
 def _refuse_absent(parser: Parser, argv: Sequence[str]) -> None:
-    """Refuse an option of a tool that ships and is absent.
+    """Refuse an option of a built-in tool that is not installed.
 
     Raises:
-        SystemExit: after reporting what installs it.
+        SystemExit: after reporting how to install it.
     """
     if not parser.lacks_option(argv):
         return

@@ -1,9 +1,7 @@
-"""``lint --untrusted``: strangers' robot files read only their own tree.
+"""``lint --untrusted``: limits untrusted robot files to their own tree, packages and presets.
 
-Installed packages and presets may be read besides it.
-
-So a pull request shows nothing of the computer that checks it: neither other files nor the
-environment, which in CI holds secrets.
+A pull request then reveals nothing about the computer that checks it: neither other files nor the
+environment, which in CI contains secrets.
 """
 
 from __future__ import annotations
@@ -60,7 +58,7 @@ _PLAIN = re.compile(r"true|false|yes|no|on|off|[-+]?[0-9]{0,9}(?:\.[0-9]{0,9})?"
 def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
     """Remove all environment variables from this process except those that programs need.
 
-    Yield all that there were.
+    Yield all the original ones.
     """
     before = dict(os.environ)
     if applies:
@@ -75,8 +73,8 @@ def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
 def declared_variables(source: Source, environment: Mapping[str, str]) -> dict[str, str]:
     """Return the variables that a file's args read, if their values cannot be secrets.
 
-    It is one of the declared choices, a switch or a number: a stranger may declare that an
-    argument reads any variable, and findings name values.
+    The value must be one of the declared choices, a switch or a number: an untrusted file may
+    declare an argument for any variable, and findings quote values.
     """
     declared: dict[str, str] = {}
     for spec in source.mapping("args").values():
@@ -93,7 +91,7 @@ def _choices(spec: Mapping[str, Any]) -> Sequence[str]:
 
 
 class UntrustedFiles:
-    """Files that a stranger's file may read; whatever else it names is refused, or not there.
+    """Files that an untrusted file may read; all others are refused, or missing.
 
     Args:
         file: the robot file or URDF.
@@ -114,7 +112,7 @@ class UntrustedFiles:
         """Return the text of a file.
 
         Raises:
-            RejectedError: if it may not or cannot be read.
+            RejectedError: if it must not or cannot be read.
         """
         if path != STDIN and not self.reach.allows(path):
             withhold(path)

@@ -1,4 +1,4 @@
-"""Files that are written all or none: one, or all of a robot's."""
+"""Atomic writes: of one file, or of all files of a robot together."""
 
 from __future__ import annotations
 
@@ -34,12 +34,11 @@ if TYPE_CHECKING:
 def replace_file(path: Path, data: bytes) -> None:
     """Write the file atomically.
 
-    Who reads it meanwhile sees the one before, whose mode and owner stay.
-
-    A device, a pipe or a symbolic link is written through.
+    A concurrent reader sees the old file. Mode and owner stay. A device, a pipe or a symbolic link
+    is written through.
 
     Raises:
-        OSError: if it cannot be written; it is as it was.
+        OSError: if it cannot be written; it is unchanged.
     """
     before = path.stat() if exists(path) else None
     if path.is_symlink() or (before and not stat.S_ISREG(before.st_mode)):
@@ -74,15 +73,13 @@ def _umask() -> int:
 def write_all(folder: Path, files: Sequence[File], earlier: Iterable[str] = ()) -> None:
     """Write files below ``folder``, such as those of a build.
 
-    A reader sees each as it was or as it is, never half.
-
-    All of them are written to a folder beside first. Only when the last byte is on the disk are
-    they moved into place, which needs no more space; if one cannot be moved, those before it are
-    put back. Parameter files of an earlier build that are not among the files are removed, and so
-    are those that are named as ``earlier``.
+    A reader sees each file old or new, never partial. All are first written to a folder beside it.
+    Only after the last byte is on the disk are they moved into place, which needs no more space;
+    if one cannot be moved, those before it are restored. Parameter files of an earlier build that
+    are not among the files are removed, and so are those in ``earlier``.
 
     Raises:
-        OSError: if the files cannot be written; then nothing has changed.
+        OSError: if the files cannot be written; nothing has changed.
     """
     made = [parent for parent in (folder, *folder.parents) if not exists(parent)]
     before = [*_parameter_files(folder), *earlier]
@@ -106,7 +103,7 @@ def write_all(folder: Path, files: Sequence[File], earlier: Iterable[str] = ()) 
 def _move(staging: Path, folder: Path, paths: list[str]) -> None:
     """Move the files into place, all or none.
 
-    What they replace is kept until the last one is there.
+    Replaced files are kept until the last one is in place.
     """
     made = [
         parent for parent in {(folder / path).parent: None for path in paths} if not exists(parent)
@@ -135,7 +132,7 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
 def _back_up(target: Path, old: Path) -> None:
     """Keep the old file under another name while a new one replaces it.
 
-    A copy where that cannot be.
+    A copy if it cannot be linked.
     """
     with contextlib.suppress(OSError):
         if not target.is_symlink():
@@ -166,10 +163,7 @@ def _write_to_disk(path: Path, text: str) -> None:
 
 
 def _parameter_files(folder: Path) -> list[str]:
-    """Return the parameter files that the plan in the folder names.
-
-    Those that an earlier build wrote.
-    """
+    """Return the parameter files in the folder's plan, which an earlier build wrote."""
     if not is_folder(folder / "params"):
         return []
     try:
@@ -196,7 +190,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
     """Build the robot; return the folder, the file names and the printed warnings.
 
     Raises:
-        SystemExit: after saying why nothing was written.
+        SystemExit: after reporting why nothing was written.
     """
     reads_back = getattr(arguments, "read_back", False)
     if reads_back and find_spec("yourdfpy") is None:
@@ -229,15 +223,15 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
 
 
 def _source_file(folder: Path) -> Path:
-    """Return the file, beside a folder that a robot's name chose, with the robot file's path.
+    """Return the file that records the robot file's path, beside a folder with the robot's name.
 
-    Two may have one name.
+    Two robots may have one name.
     """
     return folder.with_name(f".{folder.name}.source")
 
 
 def _other_source(folder: Path, file: str) -> Path | None:
-    """Return the other robot file that the folder was built from, if that is still there."""
+    """Return the other robot file that the folder was built from, if it still exists."""
     with contextlib.suppress(OSError, ValueError):
         before = folder / os.fsdecode(_source_file(folder).read_bytes()).removesuffix("\n")
         if not before.samefile(file):
@@ -246,14 +240,14 @@ def _other_source(folder: Path, file: str) -> Path | None:
 
 
 def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:
-    """Return the folder that the robot is built in, and how the files in it name others."""
+    """Return the folder to build the robot in, and the form of addresses in its files."""
     folder = Path(arguments.output) if arguments.output else Path("build") / robot.name
     form: Form = getattr(arguments, "mesh", "as-written")
     return folder, Target(form, folder.as_posix(), Path.cwd().as_posix())
 
 
 def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Finding]:
-    """Return the differences of URDFs that were read back."""
+    """Return the differences between URDFs read back and the robot."""
     from tfcompose.compiler.urdf.read_back import differences
 
     texts = {file.path: file.text for file in files}
@@ -273,7 +267,7 @@ def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Fi
 
 
 def _without_address(asset: Asset, form: Form) -> Finding:
-    """Return the finding that a file cannot be addressed as the command line asks for."""
+    """Return the finding for a file that has no address of the requested form."""
     if form != "package":
         return finding(
             "TF724",

@@ -45,9 +45,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Look and print the findings.
+    """Observe and print the findings.
 
-    Exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use.
+    Exit code 0 without findings, 1 with findings, 2 for wrong use.
     """
     from tfcompose.foundation.findings import finding
     from tfcompose.foundation.signals import Stop
@@ -122,7 +122,7 @@ def _plan(arguments: Namespace) -> Plan | None:
     """Return the given robot's plan, else the plan of the robot that runs here, if any.
 
     Raises:
-        SystemExit: after saying what is wrong.
+        SystemExit: after reporting its errors.
     """
     from tfcompose.cli.plans import expected_plan
     from tfcompose.cli.runs import plan_of_domain
@@ -135,7 +135,7 @@ def _plan(arguments: Namespace) -> Plan | None:
 
 
 def _expected_topics(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
-    """Return the topics to look at, each pair with the part of the plan that is expected there."""
+    """Return the topics to observe, each pair with its part of the plan."""
     from tfcompose.model.plan.topics import parts_of, topics_below
 
     topics = topics_below(below or "")

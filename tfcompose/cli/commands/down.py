@@ -32,7 +32,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Stop it; exit code 0 when it has ended, 1 if none runs or it does not end in time."""
+    """Stop the robot; exit code 0 once it has ended, 1 if none runs or it does not end in time."""
     from tfcompose.cli.runs import chosen_run, notices, request
     from tfcompose.model.messages import Done, DownRequest, Ended
 

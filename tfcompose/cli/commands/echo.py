@@ -149,10 +149,10 @@ def _format_pose(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
 
 
 def _time(text: str) -> int:
-    """Read seconds as nanoseconds, exactly.
+    """Parse seconds as nanoseconds, exactly.
 
     Raises:
-        ArgumentTypeError: if it is no number, or more than a stamp can hold.
+        ArgumentTypeError: if it is not a number, or more than a stamp can hold.
     """
     match = re.fullmatch(r"(-?)(\d{1,10})(?:\.(\d{1,9}))?", text)
     if match is None or int(match[2]) >= 1 << 31:
@@ -162,7 +162,7 @@ def _time(text: str) -> int:
 
 
 def _digits(text: str) -> int:
-    """Read a number of decimals.
+    """Parse a number of decimals.
 
     Raises:
         ArgumentTypeError: if it is not from 0 to 15.

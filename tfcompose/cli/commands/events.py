@@ -27,7 +27,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print events until the robot ends.
 
-    Exit code 0, 1 where none runs, or the connection is lost before it ends.
+    Exit code 0, or 1 if none runs, or the connection is lost before it ends.
     """
     from tfcompose.cli.console import Console
     from tfcompose.cli.runs import chosen_run, notices
@@ -66,7 +66,7 @@ def run(arguments: Namespace) -> int:
 def _is_held(runtime_dir: RuntimeDir) -> bool:
     """Return whether the robot still runs.
 
-    One that ends hangs up a moment before it gives its lock back.
+    A robot that ends hangs up a moment before it releases its lock.
     """
     for _ in range(40):
         if runtime_dir.holder() is None:

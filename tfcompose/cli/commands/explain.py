@@ -43,7 +43,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the page or the chain; exit code 1 if a frame is not there, 2 for wrong use."""
+    """Print the page or the chain; exit code 1 if a frame does not exist, 2 for wrong use."""
     match arguments.what:
         case [] if arguments.table:
             from tfcompose.cli.documentation import code_table

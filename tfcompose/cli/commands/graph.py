@@ -81,9 +81,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Draw; exit code 0, 1 with errors in the robot, 2 for an unknown ending.
+    """Draw the graph.
 
-    Also 2 for what cannot be read or written.
+    Exit code 0, 1 with errors in the robot, 2 for an unknown ending or a file that cannot be read
+    or written.
     """
     path = Path(arguments.output)
     _check_output(path)
@@ -111,10 +112,10 @@ def run(arguments: Namespace) -> int:
 
 
 def _check_output(path: Path) -> None:
-    """Refuse a picture that cannot be written, before anything is done for it.
+    """Refuse a picture that cannot be written before doing any work for it.
 
     Raises:
-        SystemExit: after saying why.
+        SystemExit: after reporting the reason.
     """
     ending = path.suffix.lower()
     if ending == ".pdf":
@@ -173,7 +174,7 @@ def graph_of_observers(
 ) -> Graph:
     """Return the observed tree as a graph, with second parents, loops and publishers.
 
-    What the plan expects and nobody publishes is said to be missing.
+    Planned edges that no node publishes are marked as missing.
     """
     from tfcompose.compiler.draw import Arrow, Graph
 

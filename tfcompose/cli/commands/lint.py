@@ -121,7 +121,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def codes(text: str) -> list[str]:
-    """Read codes or prefixes of codes, separated by commas.
+    """Parse codes or prefixes of codes, separated by commas.
 
     Raises:
         ArgumentTypeError: if there is no such code, or none that may be silenced.
@@ -197,7 +197,7 @@ def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[
 
 
 def _watch(arguments: Namespace, environment: Mapping[str, str]) -> int:
-    """Lint again whenever a file changes that was read, or one comes to a folder.
+    """Lint again whenever a file that was read changes, or a folder gets a new one.
 
     Ctrl-C ends it.
     """
@@ -225,14 +225,14 @@ def _watch(arguments: Namespace, environment: Mapping[str, str]) -> int:
 
 
 def _stamps(arguments: Namespace) -> dict[str, _Stamp]:
-    """Return the stamps of the files that are named."""
+    """Return the stamps of the named files."""
     return {
         file: _stamp(file) for file in (*_files(arguments), *arguments.urdfs, *arguments.overlays)
     }
 
 
 def _stamp(file: str) -> _Stamp:
-    """Return the file's time of change and size, or None if it is not there."""
+    """Return the file's modification time and size, or None if it does not exist."""
     try:
         found = Path(file).stat()
     except (OSError, ValueError):
@@ -241,7 +241,7 @@ def _stamp(file: str) -> _Stamp:
 
 
 def _files(arguments: Namespace) -> list[str]:
-    """Return the files that are named, those of folders among them."""
+    """Return the named files, and those in named folders."""
     names = arguments.files or ([] if arguments.urdfs else [DEFAULT_FILE])
     files = dict.fromkeys(file for name in names for file in robots_in(name))
     if not arguments.skip_foreign:
@@ -270,9 +270,9 @@ def _failing(arguments: Namespace) -> frozenset[str]:
 
 
 def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
-    """Fix the files, or print the difference, and return what remains in each.
+    """Fix the files, or print the difference, and return the remaining findings of each.
 
-    A file that cannot be written, alone.
+    If a file cannot be written, return only its finding.
     """
     from tfcompose.foundation.findings import Span, finding
 

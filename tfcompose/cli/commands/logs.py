@@ -63,7 +63,7 @@ _UNIT_S = {"s": 1, "m": 60, "min": 60, "h": 3600, "d": 86400}
 
 
 def since(text: str) -> float:
-    """Read how long ago, or a local time, as seconds since 1970.
+    """Parse a duration before now, or a local time, as seconds since 1970.
 
     Raises:
         ArgumentTypeError: if it is neither.
@@ -115,9 +115,9 @@ def run(arguments: Namespace) -> int:
 
 
 def _runtime_dir(robot: str | None, command: str) -> RuntimeDir:
-    """Return the robot that runs, or the one that has run last.
+    """Return the robot that runs, or the one that ran last, among those selected.
 
-    Of those that the name, or else this shell, means.
+    The name selects them, or else this shell.
     """
     from tfcompose.cli.runs import chosen_run, in_scope, is_meant
     from tfcompose.foundation.reading import is_folder

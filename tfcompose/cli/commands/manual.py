@@ -23,7 +23,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the page; exit code 2 if there is none."""
+    """Print the page; exit code 2 if it does not exist."""
     import os
     import pydoc
     import sys

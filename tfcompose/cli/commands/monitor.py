@@ -50,7 +50,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Monitor until a signal comes.
 
-    Exit code 1 if no TF came, or no chain from A to B is there, 2 for a bad bag.
+    Exit code 1 without TF, or without a chain from A to B, 2 for a bad bag.
     """
     from tfcompose.cli.live import observe
     from tfcompose.cli.screen import LiveLines
@@ -85,12 +85,12 @@ def run(arguments: Namespace) -> int:
 
 
 def _namespace_here() -> str:
-    """Return the namespace of the TF topics of the robot that runs in this ROS domain.
+    """Return the TF namespace of the robot that runs in this ROS domain.
 
-    Empty for the global ones.
+    Empty for the global topics.
 
     Raises:
-        SystemExit: after naming the namespaces, if it has several and none of them is global.
+        SystemExit: after naming the namespaces, if there are several and none is global.
     """
     from tfcompose.cli.runs import run_of_domain
     from tfcompose.model.plan.topics import GLOBAL, namespace_options, parts_of
@@ -110,7 +110,7 @@ def _namespace_here() -> str:
 
 
 class _Table(NamedTuple):
-    """The edges of a tree, or those between two frames, as they are printed."""
+    """The printed edges: of a tree, or between two frames."""
 
     observer: TreeObserver
     topics: Topics

@@ -63,7 +63,7 @@ def _pose_in_top(chain: list[Edge]) -> Pose:
 def _moving(edges: list[Edge]) -> str:
     """Return the line about moving edges in the chain, and the poses assumed for them.
 
-    Nothing if nothing does.
+    Empty if none moves.
     """
     joints = [edge.joint_name for edge in edges if edge.kind == "joint"]
     others = [edge.name for edge in edges if edge.kind == "dynamic"]

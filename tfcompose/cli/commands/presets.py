@@ -125,7 +125,7 @@ def _list(only: str | None, known: Library, form: str) -> int:
 
 
 def _likeness(preset: PresetSpec, known: Library) -> dict[str, str]:
-    """Return of which other model it has the very same frames, or which it is made from."""
+    """Return the model with exactly the same frames, or the one that it is derived from."""
     if not preset.extends or "/_" in preset.extends:
         return {}
     other = known.get(preset.extends)

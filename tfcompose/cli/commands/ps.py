@@ -79,7 +79,7 @@ def run(arguments: Namespace) -> int:
 
 
 def _count_by_severity(findings: Sequence[Finding]) -> str:
-    """Return how many errors and warnings there are: "1 error and 2 warnings"."""
+    """Return the numbers of errors and warnings as text: "1 error and 2 warnings"."""
     counts = Counter(finding.severity for finding in findings)
     return " and ".join(plural(counts[kind], kind) for kind in counts)
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class ProcessCommand:
     """A command that asks the launcher to start, stop or restart processes.
 
-    ``help_text`` is its page.
+    ``help_text`` is its help.
     """
 
     def __init__(self, action: Verb, progress: str, help_text: str) -> None:
@@ -31,7 +31,7 @@ class ProcessCommand:
         """Ask the launcher.
 
         Returns:
-            0, 1 where it refuses or none runs, 2 where several robots run and none is named.
+            0; 1 if it refuses or no robot runs; 2 if several robots run and none is named.
         """
         from tfcompose.cli.runs import control_processes
 

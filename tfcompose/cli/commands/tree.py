@@ -54,7 +54,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print the tree; exit code as for build.
 
-    Of a published one 1 if there is none, 2 if a bag cannot be read.
+    For a published tree, 1 if there is none, 2 if a bag cannot be read.
     """
     settle_duration(arguments, 3.0, is_live=arguments.live)
     if arguments.live or arguments.bag:
@@ -77,7 +77,7 @@ def run(arguments: Namespace) -> int:
 def _fit_to_terminal(text: str) -> str:
     """Return the text with each line cut to the width of the terminal.
 
-    Into a file or a pipe it stays as it is.
+    For a file or a pipe it is unchanged.
     """
     from tfcompose.cli.tables import shorten
 
@@ -90,7 +90,7 @@ def _fit_to_terminal(text: str) -> str:
 def _planned_json(robot: Robot) -> str:
     """Return one line of JSON, in the shape of --live.
 
-    The trees with their roots, and what the robot says of edges.
+    It has the trees with their roots, and the robot file's data about edges.
     """
     from tfcompose.compiler.emit.plan import plan_of
     from tfcompose.tf.live.edges import forest
@@ -235,10 +235,7 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
 
 
 def _owner(branch: Branch, plan: Plan | None) -> str:
-    """Return the publisher of the frame.
-
-    The owner with its node where it is the owner, else the node.
-    """
+    """Return the publisher of the frame: the owner with its node, or another node."""
     from tfcompose.guard.verdict.ownership import may_be_owners, relays_of
 
     planned, observed = branch.planned, branch.observed[0]

@@ -113,9 +113,10 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
 
 
 def other_plan(arguments: Namespace, plan: Plan) -> Plan | None:
-    """Return the plan by which the robot runs here, after saying so, if that is a variant.
+    """Return the plan by which the robot runs here, after printing a note, if it is a variant.
 
-    Its processes or owners differ, as by another profile; other poses are what is to be found.
+    A variant has other processes or owners, as with another profile. Other poses do not count:
+    verify is to find those.
     """
     from tfcompose.cli.runs import run_of_domain
 
@@ -136,7 +137,7 @@ def _shape(plan: Plan) -> tuple[Mapping[str, str], Mapping[str, str]]:
 
 
 def of_other_plan(verdict: Verdict, running: Plan) -> Verdict:
-    """Return a verdict without advice about processes of the plan that runs."""
+    """Return a verdict without advice about processes of the running plan."""
     from dataclasses import replace
 
     advice = "tfcompose verify --running compares with the plan that runs"

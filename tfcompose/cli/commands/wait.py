@@ -30,7 +30,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Wait; exit code of the robot, or 0 when it is ready.
 
-    1 when the time is over or none runs.
+    1 if the time is over or no robot runs.
     """
     from tfcompose.cli.runs import chosen_run, notices, wait_until_ready
     from tfcompose.model.messages import Ended

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-#: Of a list of names so many are shown.
+#: How many names of a list are shown.
 LISTED = 6
 
 
 def plural(number: int, noun: str) -> str:
-    """Return the number with the word, in the plural where it belongs: "1 edge", "2 edges"."""
+    """Return the number with the noun, pluralised if needed: "1 edge", "2 edges"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
@@ -42,7 +42,7 @@ def duration(seconds: float) -> str:
 
 
 def visible(text: str) -> str:
-    """Return the text with invisible characters, such as control ones, as Python escapes."""
+    """Return the text with invisible characters, such as control characters, as Python escapes."""
     return "".join(map(_visible_character, text))
 
 

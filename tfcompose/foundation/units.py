@@ -375,9 +375,7 @@ class Measure:
         if kind is not float and kind is not int:
             value = self._convert(value)
         if not -LARGEST <= value <= LARGEST:
-            raise invalid(
-                "TF106", f"{format_value(float(value))} is beyond what can be computed with"
-            )
+            raise invalid("TF106", f"{format_value(float(value))} is too large to compute with")
         return value if kind is float else value if isinstance(value, WithUnit) else float(value)
 
     def _convert(self, value: Any) -> float:

@@ -119,7 +119,7 @@ def _command_of(
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, *files)
     if not own and not folder.is_dir():
-        lost = f"the folder {folder} that {process.name} runs in does not exist"
+        lost = f"the working directory {folder} of {process.name} does not exist"
         return (
             ChildCommand(argv, env, folder, missing=lost)
             if process.required is False
@@ -305,7 +305,7 @@ def executable_of(
         path = folder / argument
         if _can_run(path):
             return str(path)
-        relative = f"${{file({argument})}} is relative to the robot file, wherever up is called"
+        relative = f"${{file({argument})}} is relative to the robot file, wherever up is run from"
         advice = () if argument.startswith("/") else (relative,)
         return NotFound(process.name, argument, (_why_not(path),), advice=advice)
     path_variable = env.get("PATH", os.defpath)

@@ -1,8 +1,8 @@
 """Messages between the processes of a run, as lines of JSON.
 
 The guard sends events to the launcher on a pipe, and takes orders on another; its log is for
-people. Other commands send requests to the launcher's control socket and get answers, or the
-notices that a person at ``up`` reads too.
+people. Other commands send requests to the launcher's control socket. They get answers, or the
+same notices that ``up`` prints.
 """
 
 from __future__ import annotations
@@ -11,27 +11,27 @@ from typing import Any, Literal
 
 import msgspec
 
-from tfcompose.foundation.findings import Finding  # noqa: TC001 (messages are read by these types)
+from tfcompose.foundation.findings import Finding  # noqa: TC001 (msgspec needs it at run time)
 from tfcompose.model.plan import LifecycleState, ProcessKind  # noqa: TC001
 
-#: What a decoder raises for a line that is no message.
+#: What a decoder raises for a line that is not a message.
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 class ProcessMessage(msgspec.Struct, frozen=True):
-    """What one process tells another, or a part of that."""
+    """A message between processes, or a part of one."""
 
 
 class _Event(ProcessMessage, frozen=True, tag_field="event", tag=True):
-    """What happened: an event of the guard, a notice, or both."""
+    """An event of the guard, a notice, or both."""
 
 
 class _Order(ProcessMessage, frozen=True, tag_field="order", tag=True):
-    """What the launcher has the guard do."""
+    """An instruction from the launcher to the guard."""
 
 
 class Request(ProcessMessage, frozen=True, tag_field="request", tag=True):
-    """What another command asks of the launcher."""
+    """A request from another command to the launcher."""
 
 
 def line_of(message: ProcessMessage) -> bytes:
@@ -43,11 +43,11 @@ def line_of(message: ProcessMessage) -> bytes:
 
 
 class Clear(_Event, frozen=True):
-    """The look before the start is over and no planned edge was published by anybody."""
+    """The check before the start is over: no node publishes a planned edge."""
 
 
 class Taken(_Event, frozen=True):
-    """A planned edge was published before the start: the plan must not start, or must end."""
+    """A planned edge was published before the start: the plan must not start, or must stop."""
 
     found: Finding
 
@@ -74,7 +74,7 @@ class OwnerReady(_Event, frozen=True):
 
 
 class TreeComplete(_Event, frozen=True):
-    """Every edge of the plan is live: a notice too."""
+    """Every edge of the plan is live. Also a notice."""
 
     edges: int
     #: Since the start; 0 from the guard, which does not know it.
@@ -82,7 +82,7 @@ class TreeComplete(_Event, frozen=True):
 
 
 class FindingShown(_Event, frozen=True, omit_defaults=True):
-    """Something is wrong: a notice too, as users see it."""
+    """Something is wrong. Also a notice, as users see it."""
 
     found: Finding
     #: The plan's process that caused it, if stopping that one would help.
@@ -90,13 +90,13 @@ class FindingShown(_Event, frozen=True, omit_defaults=True):
 
 
 class CurrentFindings(_Event, frozen=True):
-    """All that is wrong now, worst first; what was sent before does not count any more."""
+    """Everything that is wrong now, worst first. It replaces what was sent before."""
 
     findings: tuple[Finding, ...]
 
 
 class RecoveredShown(_Event, frozen=True):
-    """A reported fault is over; the text says which. A notice too."""
+    """A reported fault is over; the text says which. Also a notice."""
 
     text: str
     #: Since the start.
@@ -104,7 +104,7 @@ class RecoveredShown(_Event, frozen=True):
 
 
 class Unfenced(_Event, frozen=True):
-    """A process of a strict plan bypasses the fence, and must be stopped."""
+    """A process of a strict plan bypasses the filter and must be stopped."""
 
     found: Finding
     process: str
@@ -113,10 +113,10 @@ class Unfenced(_Event, frozen=True):
 
 
 class GateState(_Event, frozen=True):
-    """The state of a process's gate: whether what it waits for is there."""
+    """The state of a process's gate, the condition that it waits for."""
 
     process: str
-    #: What is there, or what is there instead.
+    #: What opened it, or what was found instead.
     seen: str
     is_open: bool
 
@@ -133,27 +133,28 @@ LoadState = Literal["loaded", "not loaded", "unloaded"]
 class ComponentState(_Event, frozen=True):
     """The state of a component, in answer to an order.
 
-    A component counts as unloaded, too, if its container lost it or does not answer.
+    It is ``unloaded`` after an order to unload it, and if its container lost it or does not
+    answer. It is ``not loaded`` if loading failed.
     """
 
     process: str
     #: The number of the order that this answers.
     number: int
     state: LoadState
-    #: The reason that it is not loaded.
+    #: Why it is not loaded; empty if it is.
     why: str = ""
 
 
 class DescriptionState(_Event, frozen=True):
-    """The answer of a node that was given the robot's description."""
+    """The outcome of giving a node the robot's description."""
 
     process: str
-    #: The reason that it refused it; empty: it took it.
+    #: Why the node did not take it; empty if it did.
     why: str = ""
 
 
 class Alive(_Event, frozen=True):
-    """The guard looks; it says so once a second."""
+    """Heartbeat: the guard is watching. Sent once a second."""
 
 
 GuardEvent = (
@@ -181,21 +182,21 @@ GUARD_EVENTS = msgspec.json.Decoder(GuardEvent)
 
 
 class Absent(_Order, frozen=True):
-    """A process of the plan was stopped on purpose, or ended: its silence is nobody's fault."""
+    """A process of the plan was stopped on purpose, or ended: its silence is no fault."""
 
     process: str
 
 
 class Present(_Order, frozen=True):
-    """A process of the plan is started, again: its edges are to be seen anew."""
+    """A process of the plan is started or restarted: wait for its edges again."""
 
     process: str
 
 
 class Gate(_Order, frozen=True):
-    """Report when this is there: a topic with a publisher, a service, or lifecycle states.
+    """Watch a process's gate: a topic with a publisher, a service, or lifecycle states.
 
-    An empty gate replaces the process's gate, and is not watched.
+    An empty gate removes the process's gate.
     """
 
     process: str
@@ -207,7 +208,7 @@ class Gate(_Order, frozen=True):
     nodes: dict[str, LifecycleState] = {}
     #: Whether the guard brings the nodes to these states.
     drive: bool = False
-    #: Topics whose publishers are named while others look at what comes there.
+    #: Topics whose publishers the guard reports; other code watches their messages.
     writers: tuple[str, ...] = ()
 
 
@@ -220,11 +221,12 @@ class ComponentOrder(_Order, frozen=True):
     do: Literal["load", "unload"]
     #: Whether an earlier guard may have loaded it already.
     again: bool = False
+    #: The parameter file with what to load.
     file: str = ""
 
 
 class DescriptionOrder(_Order, frozen=True):
-    """Give a process's node the robot's description that its parameter file has now.
+    """Give a process's node the robot's description from its parameter file, as it is now.
 
     A ``DescriptionState`` answers it.
     """
@@ -235,7 +237,7 @@ class DescriptionOrder(_Order, frozen=True):
 
 
 class Reread(_Order, frozen=True):
-    """Read the plan anew: its edges' lines have changed, or poses that ``static`` sends."""
+    """Read the plan again: lines of its edges, or poses that ``static`` sends, have changed."""
 
     file: str
 
@@ -263,67 +265,63 @@ class LogLine(_Event, frozen=True):
 
 
 class ProcessState(_Event, frozen=True):
-    """A process went into this state.
-
-    ``detail`` says why, where there is more to say: "exit code 3; again in 2 s".
-    """
+    """A process entered a state."""
 
     process: str
     state: StateName
     pid: int | None = None
+    #: Why, if there is more to say: "exit code 3; again in 2 s".
     detail: str = ""
 
 
 class OwnerLive(_Event, frozen=True):
-    """All edges of an owner were received from it, ``seconds`` after the start.
-
-    ``edges`` are their names.
-    """
+    """All edges of an owner were received from it."""
 
     owner: str
     node: str
+    #: Their names, ``parent → child``.
     edges: tuple[str, ...]
+    #: Since the start.
     seconds: float
 
 
 class ProcessReady(_Event, frozen=True):
-    """A process that waited for something of its own is ready, ``seconds`` after the start.
-
-    ``seen`` says by what.
-    """
+    """A process with its own gate is ready."""
 
     process: str
+    #: What opened the gate.
     seen: str
+    #: Since the start.
     seconds: float
 
 
 class AllStarted(_Event, frozen=True):
-    """Whatever can be started was.
+    """Everything that can be started has been."""
 
-    ``waiting`` are processes that wait for others to be ready, or done.
-    """
-
+    #: The number of processes that were started.
     started: int
+    #: Processes that wait until others are ready, or done.
     waiting: tuple[str, ...]
+    #: Since the start.
     seconds: float
 
 
 class StartRow(ProcessMessage, frozen=True):
-    """When a process was started and ready, in seconds after the start; None: it is external."""
+    """When a process was started and ready, in seconds after the start."""
 
     process: str
+    #: None: the process is external.
     started: float | None
     ready: float
 
 
 class AllReady(_Event, frozen=True):
-    """Every process is ready and every edge live, ``seconds`` after the start.
-
-    But for those that were given up.
-    """
+    """Every process is ready and every edge live."""
 
     rows: tuple[StartRow, ...]
+    #: Since the start.
     seconds: float
+    #: Processes that the launcher gave up on.
     without: tuple[str, ...] = ()
 
 
@@ -333,7 +331,7 @@ class Replanned(_Event, frozen=True):
     changed: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
-    #: Frames that listeners still hold.
+    #: Removed fixed edges, which running listeners keep.
     held: tuple[str, ...] = ()
     #: Processes that get a new description while they run.
     described: tuple[str, ...] = ()
@@ -350,7 +348,7 @@ class Missing(ProcessMessage, frozen=True):
 
 
 class Waiting(_Event, frozen=True):
-    """Edges that nobody has published yet, by owner."""
+    """Edges that no node has published yet, by owner."""
 
     missing: tuple[Missing, ...]
 
@@ -358,9 +356,9 @@ class Waiting(_Event, frozen=True):
 class FilesRestored(_Event, frozen=True):
     """The files of the run were removed, and restored where possible."""
 
-    #: The folder that they are in again; empty: they are in none.
+    #: The folder with the restored files; empty if they could not be restored.
     folder: str
-    #: The reason that they could not be restored.
+    #: Why they could not be restored.
     why: str = ""
 
 
@@ -371,7 +369,7 @@ class Stopping(_Event, frozen=True):
 
 
 class Ended(_Event, frozen=True):
-    """Nothing runs any more: the last notice."""
+    """Everything has stopped. The last notice."""
 
     exit_code: int
     #: The message and notes of the first failure.
@@ -403,19 +401,19 @@ class _Timed(ProcessMessage, frozen=True):
 
 
 def notice_line(notice: Notice, at: float) -> str:
-    """Return the notice as one line of JSON, without its end.
+    """Return the notice as one line of JSON, without the newline.
 
-    ``at`` is when, in seconds since 1970.
+    ``at`` is its time, in seconds since 1970.
     """
     data = {"event": "", "at": round(at, 3)} | msgspec.to_builtins(notice)
     return msgspec.json.encode(data).decode()
 
 
 def read_notice(line: bytes) -> tuple[Notice, float]:
-    """Return the notice that ``notice_line`` wrote, and when.
+    """Return the notice that ``notice_line`` wrote, and its time in seconds since 1970.
 
     Raises:
-        UNREADABLE: if the line is none.
+        UNREADABLE: if the line is not a notice.
     """
     return NOTICES.decode(line), msgspec.json.decode(line, type=_Timed).at
 
@@ -426,11 +424,11 @@ Verb = Literal["stop", "start", "restart"]
 
 
 class StatusRequest(Request, frozen=True):
-    """What is known of the run? Answered by a ``RobotStatus``."""
+    """Return the status of the run. Answered by a ``RobotStatus``."""
 
 
 class EventsRequest(Request, frozen=True):
-    """From now on, the notices: first those that were sent already. Answered by these alone."""
+    """Send all notices so far, then new ones as they come. Answered by these alone."""
 
 
 class DownRequest(Request, frozen=True):
@@ -445,12 +443,11 @@ class ProcessRequest(Request, frozen=True):
 
 
 class UpdateRequest(Request, frozen=True):
-    """Follow another plan: its file, and the folder that it was built in.
+    """Follow another plan. Answered by a ``PlanChange``."""
 
-    Answered by a ``PlanChange``.
-    """
-
+    #: The file of the plan.
     plan: str
+    #: The folder that it was built in.
     base: str
 
 
@@ -466,17 +463,17 @@ class Refusal(ProcessMessage, frozen=True):
 
 
 class Done(ProcessMessage, frozen=True):
-    """The request is being carried out."""
+    """The request is accepted and being carried out."""
 
     ok: Literal[True] = True
-    #: What a process that is started waits for first.
+    #: What the process waits for before it starts.
     waits: str = ""
 
 
 class PlanChange(ProcessMessage, frozen=True):
     """The changes that another plan brings.
 
-    tf2 never forgets a fixed edge, so listeners hold those that vanish until they restart.
+    tf2 never forgets a fixed edge, so running listeners keep removed ones until they restart.
     """
 
     #: Processes that differ.
@@ -485,12 +482,12 @@ class PlanChange(ProcessMessage, frozen=True):
     added: tuple[str, ...]
     #: Processes that are gone.
     removed: tuple[str, ...]
-    #: Fixed edges that vanish.
+    #: Removed fixed edges, which running listeners keep.
     held: tuple[str, ...]
     ok: Literal[True] = True
     #: Processes that get a new description while they run.
     described: tuple[str, ...] = ()
-    #: Whether the plan is another one at all, if only in its lines of the robot file.
+    #: Whether the plan differs at all, even if only in line numbers of the robot file.
     differs: bool = False
 
 
@@ -508,7 +505,7 @@ class ProcessStatus(ProcessMessage, frozen=True):
     ready: bool
     #: What it waits for.
     waits: str
-    #: What is there instead.
+    #: What was found instead.
     seen: str
     pid: int | None
     #: In seconds.
@@ -537,5 +534,5 @@ class RobotStatus(ProcessMessage, frozen=True):
     missing: tuple[str, ...]
     silent: tuple[str, ...]
     processes: tuple[ProcessStatus, ...]
-    #: What the guard sees wrong now, worst first.
+    #: The guard's current findings, worst first.
     findings: tuple[Finding, ...] = ()

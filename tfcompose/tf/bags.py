@@ -352,8 +352,8 @@ def _files_at(path: Path) -> list[Path]:
         raise BagError(f"{path} is a bag of ROS 1", "rosbags-convert makes one of ROS 2 from it")
     if path.suffix in {".zstd", ".zst"}:
         raise BagError(
-            f"{path} is compressed as one file",
-            "name its folder with metadata.yaml, or unzstd it first",
+            f"{path} is a file that is compressed as a whole",
+            "name its folder, which has metadata.yaml, or decompress it first: unzstd FILE",
         )
     if path.suffix not in ENDINGS:
         raise BagError(

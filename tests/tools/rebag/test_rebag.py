@@ -172,7 +172,7 @@ def test_a_corrected_bag_has_nothing_more_to_correct(folder: Path) -> None:
     write_bag(folder / "drive", RECORDED)
     assert "off by" in rebag(folder, "drive", "--check", code=1)
     rebag(folder, "drive", "right")
-    assert rebag(folder, "right", "--check") == "3 fixed edges as in the robot file\n"
+    assert rebag(folder, "right", "--check") == "3 fixed edges already match the robot file\n"
     rebag(folder, "right", "again")
     assert messages_of(folder / "again") == messages_of(folder / "right")
 
@@ -185,7 +185,7 @@ def test_check_writes_nothing_and_says_how_far_each_edge_is_off(folder: Path) ->
         ("base_link → laser", "moved", 0),
         ("base_link → bracket", "added", 0),
         ("bracket → lens", "added", 0),
-        ("base_link → bracket", "left /tf", 1),
+        ("base_link → bracket", "removed from /tf", 1),
     ]
     (laser,) = [each for each in found["edges"] if each["change"] == "moved"]
     assert (laser["mm"], laser["deg"]) == pytest.approx((40, 5))

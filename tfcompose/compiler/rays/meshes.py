@@ -1,4 +1,4 @@
-"""Rays against the triangles of mesh files, by trimesh."""
+"""Ray casting against mesh files, with trimesh."""
 
 from __future__ import annotations
 
@@ -23,33 +23,33 @@ _read = lru_cache(maxsize=32)(read_mesh)
 def distances(
     path: str, scale: Vector, origin: Vector, directions: Sequence[Vector]
 ) -> list[float]:
-    """Return how far along each ray the mesh begins, endless where it is missed.
+    """Return the distance along each ray to its first hit, infinity where it misses.
 
-    All in the mesh's frame, in metres.
+    Rays are in the mesh's frame, in metres; ``directions`` are unit vectors.
 
     Raises:
-        Exception: whatever a reader raises for a file that is no mesh.
+        Exception: any error of trimesh's reader, if the file is not a mesh.
     """
     mesh = _read(path, scale)
-    found = np.full(len(directions), np.inf)
+    nearest = np.full(len(directions), np.inf)
     origins = np.tile(origin, (len(directions), 1))
-    where, rays, _ = mesh.ray.intersects_location(
+    hits, rays, _ = mesh.ray.intersects_location(
         origins, np.asarray(directions), multiple_hits=True
     )
-    if len(where):
-        np.minimum.at(found, rays, np.linalg.norm(where - origins[rays], axis=1))
-    return [float(distance) for distance in found]
+    if len(hits):
+        np.minimum.at(nearest, rays, np.linalg.norm(hits - origins[rays], axis=1))
+    return [float(distance) for distance in nearest]
 
 
 def sphere_around(path: str, scale: Vector) -> tuple[Vector, float]:
-    """Return the centre of the mesh's box, in its frame, and the radius around that box.
+    """Return the centre and radius of the sphere around the mesh's box, in the mesh's frame.
 
     Raises:
-        Exception: whatever a reader raises for a file that is no mesh.
+        Exception: any error of trimesh's reader, if the file is not a mesh.
     """
-    least, most = (tuple(map(float, corner)) for corner in _read(path, scale).bounds)
-    x, y, z = ((low + high) / 2 for low, high in zip(least, most, strict=True))
-    return (x, y, z), math.dist(least, most) / 2
+    lower, upper = (tuple(map(float, corner)) for corner in _read(path, scale).bounds)
+    x, y, z = ((low + high) / 2 for low, high in zip(lower, upper, strict=True))
+    return (x, y, z), math.dist(lower, upper) / 2
 
 
 def depth_in(path: str, scale: Vector, point: Vector) -> float:
@@ -58,7 +58,7 @@ def depth_in(path: str, scale: Vector, point: Vector) -> float:
     Negative outside, and in a mesh that is not closed.
 
     Raises:
-        Exception: whatever a reader raises for a file that is no mesh.
+        Exception: any error of trimesh's reader, if the file is not a mesh.
     """
     mesh = _read(path, scale)
     is_within = all(
@@ -67,5 +67,5 @@ def depth_in(path: str, scale: Vector, point: Vector) -> float:
     )
     if not is_within or not mesh.is_watertight:
         return -1.0
-    near: Any = trimesh.proximity
-    return float(near.signed_distance(mesh, [point])[0])
+    proximity: Any = trimesh.proximity
+    return float(proximity.signed_distance(mesh, [point])[0])

@@ -52,8 +52,8 @@ _PACKAGE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 #: Bytes of an expression that the process keeps for when it ends.
 _NOTED = 4000
 _OUTSIDE = (
-    "a file reads its folder, its repository, and ROS packages, which have a package.xml; --trust"
-    " lifts that for files of your own"
+    "a file may read only its own folder, its repository and ROS packages (folders with a"
+    " package.xml); --trust lifts this for files of your own"
 )
 _UNSAFE = "an expression computes values: leave these names out"
 _ALONE = (

@@ -1,8 +1,8 @@
-"""XML text as elements that know the place of every tag and attribute, in expanded xacro too.
+"""XML elements that know the span of every tag and attribute, even after xacro expansion.
 
-Own code on expat, because no XML library gives the columns of attributes. Documents that declare
-entities or a document type are refused: a robot needs neither, and both can make a small file
-large or read other files.
+Written directly on expat, because no XML library gives the columns of attributes. Documents
+that declare entities or a document type are refused: a robot needs neither, and both can make a
+small file large or read other files.
 """
 
 from __future__ import annotations
@@ -32,16 +32,13 @@ _TAG = re.compile(r"<[^\s/>]+")
 _ATTRIBUTE = re.compile(r"""\s*([^\s=/>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _BROKEN = re.compile(r"""=\s*(?:"[^"<>]*[\t\r\n]|'[^'<>]*[\t\r\n])""")
 _BREAK = re.compile("\r\n|\r|\n")
-#: The bytes that begin no character in UTF-8.
+#: Continuation bytes of UTF-8.
 _INSIDE = bytes(range(0x80, 0xC0))
 _BLOCK = 4096
 
 
 class _Text:
-    """A file's text, with the places of its bytes.
-
-    Few are asked for, and they are computed only then.
-    """
+    """A file's text, with positions of its bytes, computed on demand because few are needed."""
 
     def __init__(self, text: str, file: str) -> None:
         self.text, self.file = text, file
@@ -50,7 +47,7 @@ class _Text:
         self.has_broken_values = _BROKEN.search(text) is not None
         self.before: list[
             int
-        ] = []  # the characters before each block of bytes; none where each byte is a character
+        ] = []  # the number of characters before each block; empty if the text is ASCII
         if len(self.data) != len(text):
             lengths = (
                 _characters(self.data[at : at + _BLOCK]) for at in range(0, len(self.data), _BLOCK)
@@ -59,14 +56,14 @@ class _Text:
         self._tag: tuple[int, dict[str, tuple[int, int]], int] = (-1, {}, 0)
 
     def position(self, byte: int) -> int:
-        """Return the character that begins at a byte."""
+        """Return the index of the character that begins at a byte."""
         if not self.before or byte <= 0:  # -1 in an empty text
             return max(byte, 0)
         block = byte // _BLOCK
         return self.before[block] + _characters(self.data[block * _BLOCK : byte])
 
     def span(self, begin: int, length: int) -> Span:
-        """Return the place of so many characters."""
+        """Return the span of ``length`` characters from index ``begin``."""
         end = min(begin + length, len(self.text))
         line, end_line = bisect_right(self.starts, begin), bisect_right(self.starts, end)
         return Span(
@@ -78,11 +75,9 @@ class _Text:
         )
 
     def tag_at(self, begin: int) -> tuple[dict[str, tuple[int, int]], int]:
-        """Return where each attribute value of a tag begins and ends, without quotes.
+        """Return the range of each attribute value, without quotes, and where the last one ends.
 
-        And where the last one ends.
-
-        The tag begins at a character, where there must be one. The last tag is remembered.
+        ``begin`` is the index of the tag's first character. The last result is cached.
         """
         if self._tag[0] != begin:
             name = _TAG.match(self.text, begin)
@@ -265,7 +260,9 @@ class _UrdfReader:
         inner = self.stack[-1]
         message = f"{reason}: <{inner.tag}> is not closed"
         notes = [Note(f"{inner.tag} begins here", inner.span)]
-        return finding("TF018", message, span, help=f"write </{inner.tag}> before it", notes=notes)
+        return finding(
+            "TF018", message, span, help=f"write </{inner.tag}> before that", notes=notes
+        )
 
     def add_text(self, piece: str) -> None:
         if self.stack:

@@ -205,7 +205,7 @@ def _ahead_help(each: StampedData, age_s: float) -> str:
             " stamp with ROS time"
         )
     advice = "the edge is late: stamp it with the time of the measurement and send at once"
-    return f"{advice}; listeners may wait, with a timeout"
+    return f"{advice}; or let listeners wait, with a timeout"
 
 
 def _delay_s(edge: EdgeState) -> float:

@@ -46,7 +46,7 @@ def share_of(plan: Plan, host: str | None, machine: str) -> Plan | Finding:
             if hosts
             else "the plan names no host: leave out --host"
         )
-        message = f"no process of {plan.robot} runs on a host {host}"
+        message = f"no process of {plan.robot} runs on a host named {host}"
         return finding("TF819", message, None, help=f"{did_you_mean(host, hosts, known)}")
     if not hosts:
         return plan

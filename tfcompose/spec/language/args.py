@@ -303,7 +303,7 @@ def _is_name(name: str) -> str:
         raise invalid(
             "TF106",
             f"{name!r} cannot name an argument",
-            "letters, digits and _: for example cameras",
+            "a letter or _, then letters, digits and _: for example cameras",
         )
     return name
 

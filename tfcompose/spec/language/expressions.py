@@ -303,7 +303,7 @@ def parse(text: str) -> Expression:
     symbols, operands = _with_names(text)
     depths = accumulate({"(": 1, ")": -1}.get(symbol, 0) for symbol in symbols)
     if max(depths, default=0) > DEEPEST:
-        raise ExpressionError(f"more than {DEEPEST} brackets inside each other")
+        raise ExpressionError(f"brackets are nested more than {DEEPEST} deep")
     python = " ".join(symbols)
     try:
         return Expression(text, ast.parse(python, mode="eval").body, operands)

@@ -344,7 +344,7 @@ def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[SpecRefu
     name = str(path[-1])
     option = preset.options.get(name)
     if option is None and name != "tf":
-        advice = did_you_mean(name, [*preset.options, "tf"], "the word tf, or an option")
+        advice = did_you_mean(name, [*preset.options, "tf"], "use tf, or an option of the preset")
         yield SpecRefusal(
             "TF606", path, f"{preset.model} has no option {name}", advice, on_key=True
         )

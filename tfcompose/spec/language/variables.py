@@ -355,7 +355,7 @@ class Variables:
         if not IDENTIFIER.fullmatch(name):
             raise ExpressionError(
                 f"{name!r} cannot name a variable",
-                "letters, digits and _: for example mast_height",
+                "a letter or _, then letters, digits and _: for example mast_height",
             )
         if isinstance(given, bool) or not isinstance(given, (int, float, str)):
             raise ExpressionError(

@@ -569,7 +569,7 @@ def target_of(
     for name in names:
         if name not in used:
             known = f"there is {', '.join(used)}"
-            message = f"no process of {plan.robot} runs on a host {name}"
+            message = f"no process of {plan.robot} runs on a host named {name}"
             findings.append(finding("TF819", message, None, help=did_you_mean(name, used, known)))
     shares = [share_of(plan, name, "") for name in used]
     findings += [share for share in shares if isinstance(share, Finding)]

@@ -271,11 +271,12 @@ def _lines(changes: list[EdgeChange]) -> Iterator[str]:
         elif change.kind == "parent":
             yield f"{change.edge}: recorded below {change.parent}"
         elif change.kind == "added":
-            yield f"{change.edge}: not recorded; added"
+            yield f"{change.edge}: not on /tf_static; added"
         else:
             yield f"{change.edge}: {change.kind}, {plural(change.transforms, 'transform')}"
     if equal:
-        yield f"{plural(equal, 'fixed edge')} as in the robot file"
+        verb = "matches" if equal == 1 else "match"
+        yield f"{plural(equal, 'fixed edge')} already {verb} the robot file"
 
 
 def warnings_of(unknown: Mapping[str, str], malformed: Mapping[str, int]) -> list[Finding]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tfcompose.model.plan.topics import Topics
 
 #: What happens to an edge of the bag or of the robot file.
-ChangeKind = Literal["moved", "equal", "parent", "added", "left /tf", "dropped"]
+ChangeKind = Literal["moved", "equal", "parent", "added", "removed from /tf", "dropped"]
 
 
 class EdgeChange(NamedTuple):
@@ -119,7 +119,7 @@ class TFCorrection:
             if child not in self._recorded
         ]
         changes += [
-            EdgeChange(edge, "left /tf", transforms=count)
+            EdgeChange(edge, "removed from /tf", transforms=count)
             for edge, count in sorted(self.left_moving.items())
         ]
         return changes + [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 from typing import TYPE_CHECKING
 
 from tests.support import processes
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 #: Building or testing one package on a busy machine.
 COLCON_TIMEOUT_S = 240
 _WITHOUT_BYTECODE = "PYTHONDONTWRITEBYTECODE"
+_FILES = ("package.xml", "setup.py", "pyproject.toml", "README.md", "LICENSE")
+_FOLDERS = ("tfcompose", "robots", "schemas")
+_IGNORED = shutil.ignore_patterns("__pycache__")
 
 
 class Workspace:
@@ -27,16 +31,13 @@ class Workspace:
         self.source.mkdir(parents=True)
 
     def add_repository(self) -> Path:
-        """Copy the files of this repository that Git knows or would add; return their folder."""
+        """Copy what colcon builds this repository from; return its folder."""
         target = self.source / "tfcompose"
-        command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-        names = processes.run(command, cwd=ROOT, check=True).stdout.split("\0")
-        for name in filter(None, names):
-            file = target / name
-            file.parent.mkdir(parents=True, exist_ok=True)
-            if (ROOT / name).is_file():
-                file.write_bytes((ROOT / name).read_bytes())
-                file.chmod((ROOT / name).stat().st_mode)
+        target.mkdir()
+        for name in _FILES:
+            shutil.copy2(ROOT / name, target)
+        for name in _FOLDERS:
+            shutil.copytree(ROOT / name, target / name, ignore=_IGNORED)
         return target
 
     def colcon(self, *arguments: str, sourced: bool = False) -> subprocess.CompletedProcess[str]:

@@ -38,17 +38,18 @@ Reply = tuple[Any, bytes]
 
 @dataclass(slots=True)
 class Outcome:
-    """How a confined process ended: with an answer, or without.
+    """How a confined process ended: with an answer, or without."""
 
-    ``code`` is its exit code, ``refused`` why it was ended because of what it sent, ``missing``
-    what the kernel does not have to confine it.
-    """
-
+    #: What it sent; None if it sent nothing.
     answer: Any = None
+    #: Its exit code.
     code: int = 0
     timed_out: bool = False
+    #: Why it was ended because of what it sent; empty if it was not.
     refused: str = ""
+    #: What the kernel lacks to confine it.
     missing: tuple[str, ...] = ()
+    #: What it printed.
     printed: str = ""
 
 

@@ -22,9 +22,11 @@ OPTICAL_XYZW: Quaternion = (-0.5, 0.5, -0.5, 0.5)
 
 
 class Pose(NamedTuple):
-    """The pose of B in A: ``xyz`` in metres, ``quat_xyzw`` a unit quaternion."""
+    """The pose of B in A."""
 
+    #: In metres.
     xyz: Vector = (0.0, 0.0, 0.0)
+    #: A unit quaternion.
     quat_xyzw: Quaternion = IDENTITY_XYZW
 
     def __matmul__(self, c_in_b: Pose) -> Pose:

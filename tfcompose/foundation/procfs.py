@@ -27,12 +27,16 @@ _MEMORY_PARTS = {
 
 
 class Stat(NamedTuple):
-    """A process: ``ticks`` are those of processors that it used, ``began`` those since boot."""
+    """A process, from /proc/PID/stat."""
 
     state: str
+    #: Process id of the parent.
     parent: int
+    #: Its process group.
     group: int
+    #: Processor time that it used, in clock ticks.
     ticks: int
+    #: Its start, in clock ticks since boot.
     began: int
 
 

@@ -61,12 +61,15 @@ _FILE_CALLS: Final[dict[str, tuple[int, int | None]]] = {
 
 
 class _Condition(NamedTuple):
-    """A system call that passes if an argument is one of ``values`` or has none of some bits."""
+    """A condition on an argument, under which a system call passes."""
 
     numbers: tuple[int, int | None]
     argument: int
+    #: The argument must be one of these.
     values: tuple[int, ...] = ()
+    #: The argument must have none of these bits.
     without_bits: int = 0
+    #: The error number of a refused call.
     refusal: int = errno.EPERM
 
 

@@ -33,18 +33,17 @@ class Command(NamedTuple):
     """A command, in a module with ``arguments(parser)`` and ``run(arguments)``.
 
     The module's docstring is the help.
-
-    ``topic`` is the page that ``help`` prints below the options, by default that of the command's
-    name. ``completes`` pairs arguments with the sections of the robot file whose names they take.
-    ``synonyms`` pairs words that other programs have for it with what to type instead.
     """
 
     name: str
     summary: str
     module: str
     group: str = "Tools"
+    #: The page that ``help`` prints below the options; default: the one with the command's name.
     topic: str = ""
+    #: Pairs of an argument and the section of the robot file whose names it takes.
     completes: tuple[tuple[str, str], ...] = ()
+    #: Pairs of a word that other programs use for it, and what to type instead.
     synonyms: tuple[tuple[str, str], ...] = ()
 
 
@@ -59,25 +58,22 @@ class Topic(NamedTuple):
 class Key(NamedTuple):
     """A section of the robot file, with its own model, validated like every other section.
 
-    ``model`` leads to a pydantic model based on ``tfcompose.spec.language.spec.Spec``. The hooks
-    run only for robots whose file has the key:
-
-    - ``processes``: a function of a ``ToolSection``, returns processes that the robot starts; with
-      the ``argv`` ``(PROGRAM, COMMAND, …)`` one runs a command of the tool;
-    - ``check``: a function of a ``ToolSection`` and the ``Robot``, returns findings; it may read
-      files;
-    - ``rules``: a module with rules, as ``tfcompose.compiler.check.rule.rule`` makes them.
-
-    With ``in_plan`` the section is in the plan: ``Plan.sections[name]`` is its model as JSON.
+    The hooks run only for robots whose file has the key.
     """
 
     name: str
+    #: A pydantic model based on ``tfcompose.spec.language.spec.Spec``.
     model: str
     about: str
     examples: tuple[Any, ...] = ()
+    #: A function of a ``ToolSection`` that returns processes for the robot to start. With the
+    #: ``argv`` ``(PROGRAM, COMMAND, …)`` a process runs a command of the tool.
     processes: str = ""
+    #: A function of a ``ToolSection`` and the ``Robot`` that returns findings; it may read files.
     check: str = ""
+    #: A module with rules, as ``tfcompose.compiler.check.rule.rule`` makes them.
     rules: str = ""
+    #: Whether the section is in the plan: ``Plan.sections[name]`` is its model as JSON.
     in_plan: bool = False
 
     def __hash__(self) -> int:
@@ -109,25 +105,23 @@ class Option(NamedTuple):
 
 
 class Tool(NamedTuple):
-    """Everything that a tool brings.
-
-    ``package`` is the one in whose folder ``topics`` its topics and the pages of its commands are,
-    ``codes`` the one in whose folder ``codes`` are the pages of its codes; empty: it has none.
-    ``extra`` is the extra of tfcompose that installs what it needs, empty if it needs nothing.
-    ``preflight`` is a function of a ``Plan``, which returns findings before anything starts on a
-    machine, also when a robot is deployed to it. It runs for plans with a section of the tool, or
-    a process that runs a command of the tool, and gets the share of the machine.
-    """
+    """Everything that a tool brings."""
 
     name: str
+    #: The package with the folder ``topics``: the tool's topics and the pages of its commands.
     package: str
     commands: tuple[Command, ...] = ()
+    #: The package with the folder ``codes``, the pages of its codes; empty if it has none.
     codes: str = ""
     topics: tuple[Topic, ...] = ()
     keys: tuple[Key, ...] = ()
     languages: tuple[Language, ...] = ()
     options: tuple[Option, ...] = ()
+    #: The extra of tfcompose that installs what it needs; empty if it needs nothing.
     extra: str = ""
+    #: A function of a ``Plan`` that returns findings before anything starts on a machine, also
+    #: when a robot is deployed to it. It runs for plans with a section of the tool or a process
+    #: that runs a command of the tool, and gets the share of the machine.
     preflight: str = ""
 
     @property

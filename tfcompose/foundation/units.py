@@ -320,16 +320,13 @@ SMALLEST = 1 / LARGEST
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """Annotates a float that may be written with a unit.
+    """Annotates a float that may be written with a unit."""
 
-    ``least`` is the smallest value that it can have.
-
-    With ``sliding`` it is of the one dimension for joints that turn, and of the other for joints
-    that slide.
-    """
-
+    #: Its dimension; with ``sliding``, the one for joints that turn.
     dimension: Dimension
+    #: The smallest value that it can have.
     least: float | None = None
+    #: The dimension for joints that slide.
     sliding: Dimension | None = None
 
     @property

@@ -30,14 +30,14 @@ class File:
 class Target:
     """Where files are written, relative to the robot's paths, and how they address others.
 
-    ``as-written`` keeps addresses; a relative path becomes relative to ``folder``, so that readers
-    of the written URDF find the file. ``package`` writes ``package://``, ``file`` absolute
-    ``file://`` (``top`` is the absolute folder that relative paths begin in), ``relative`` paths
-    from ``folder``.
+    ``as-written`` keeps addresses. ``package`` writes ``package://``, ``file`` absolute
+    ``file://``, and ``relative`` paths from the folder.
     """
 
     form: Form = "as-written"
+    #: The folder of the written file; relative paths become relative to it.
     folder: str = "."
+    #: The absolute folder from which relative paths begin.
     top: str = "/"
 
     def address(self, asset: Asset) -> str:

@@ -84,9 +84,10 @@ class Integer:
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """A process that another system starts; ``awaited`` says that others wait for its end."""
+    """A process that another system starts."""
 
     process: PlanProcess
+    #: Whether other processes wait for its end.
     awaited: bool = False
 
 
@@ -118,14 +119,13 @@ KeywordKind = Literal["text", "switch", "number", "output", "variables", "shutdo
 
 @dataclass(frozen=True, slots=True)
 class Keyword:
-    """A keyword of launch's actions and its attribute in XML and YAML, by default of that name.
-
-    ``ros1`` is the attribute of ROS 1's launch that is true where this one says ``shutdown``.
-    """
+    """A keyword of launch's actions and its attribute in XML and YAML."""
 
     name: str
     kind: KeywordKind = "text"
+    #: Default: the name of the keyword.
     attribute: str = ""
+    #: The attribute of ROS 1's launch that is true where this one is ``shutdown``.
     ros1: str = ""
 
 
@@ -137,24 +137,22 @@ class PythonCode(str):
 
 @dataclass(frozen=True, slots=True)
 class LaunchDialect:
-    """What a key is to launch, both ways.
-
-    ``settings`` are values by keyword, and ``gaps`` sentences about what launch does otherwise.
-    ``read`` returns the key's value in the language by what the keywords hold, None where it is
-    not said, and adds to a list what cannot be read. ``of_file`` are the gaps of a process that
-    is an included launch file; None: it has no such key.
-
-    ``is_external`` says that launch has no such thing: it starts ``tfcompose.launcher.exec``,
-    which does it. ``is_own`` says that only a program that launch starts itself gets the keywords,
-    because ``tfcompose.launcher.exec`` does the same.
-    """
+    """How launch expresses a key, in both directions."""
 
     keywords: tuple[Keyword, ...] = ()
+    #: Values by keyword.
     settings: Callable[[PlanProcess], Iterable[Setting]] = _nothing
+    #: Sentences about what launch does differently.
     gaps: Callable[[PlanProcess], Iterable[str]] = _nothing
+    #: Returns the key's value in the language from the keywords' values, None if it is not set. It
+    #: appends what cannot be read to the list.
     read: Callable[[Mapping[str, Any], list[str]], Any] = lambda _record, _todo: None
+    #: The gaps of a process that is an included launch file; None: it has no such key.
     of_file: Callable[[PlanProcess], Iterable[str]] | None = None
+    #: True: launch lacks this, so it starts ``tfcompose.launcher.exec``, which does it.
     is_external: bool = False
+    #: True: only a program that launch itself starts gets the keywords, because
+    #: ``tfcompose.launcher.exec`` does the same.
     is_own: bool = False
 
 
@@ -164,22 +162,21 @@ _UNSET_COMPONENT = Component("", "", "")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessKey:
-    """A key of a process. ``type`` is a Python type or one of those above.
-
-    ``to`` says to which processes it applies. ``is_shared`` says that a driver's further processes
-    have it from the first. ``habits`` are other formats' names for it, separated by blanks, each
-    with what to write instead. ``shown`` are the lines of ``up --dry-run``, label and text; None
-    shows the value under the key's name.
-    """
+    """A key of a process."""
 
     name: str
+    #: A Python type or one of those above.
     type: Any
     default: Any = None
     help: str
     examples: tuple[Any, ...] = ()
+    #: The processes to which it applies.
     to: tuple[Way, ...] = ("run",)
+    #: Whether a driver's further processes take it from the first.
     is_shared: bool = False
+    #: Other formats' names for it, separated by blanks, each with what to write instead.
     habits: tuple[tuple[str, str], ...] = ()
+    #: The lines of ``up --dry-run``, label and text; None: the value under the key's name.
     shown: Callable[[PlanProcess], Iterable[tuple[str, str]]] | None = None
     systemd: Dialect = field(default_factory=Dialect)
     compose: Dialect = field(default_factory=Dialect)

@@ -30,14 +30,14 @@ _DOUBLE = "double"
 
 @dataclass(frozen=True, slots=True)
 class LoadRequest:
-    """A component to load. ``container`` and ``node`` are full names of nodes.
-
-    Values of parameters are those of ROS.
+    """A component to load, with values of parameters as ROS has them.
 
     A list has values of one kind; a list of whole and other numbers counts as one of others.
     """
 
+    #: The full name of the container's node.
     container: str
+    #: The full name of the component's node.
     node: str
     component: Component
     remap: dict[str, str] = field(default_factory=dict)

@@ -15,17 +15,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """A file of triangles or an image, as it was addressed and where it is.
-
-    ``path`` is where it was found, or where it has to be: absolute, or relative like the robot's
-    own file; empty where nobody here can say. ``package`` and ``inside`` are the package that it
-    is in and the path there, if it is in one.
-    """
+    """A mesh or an image, by its address and its file."""
 
     uri: str
     span: Span | None = None
+    #: The file: absolute, or relative like the robot's own file; empty if it cannot be known here.
     path: str = ""
+    #: The package that it is in, if any.
     package: str = ""
+    #: The path in that package.
     inside: str = ""
 
 
@@ -46,13 +44,11 @@ def colour_name(rgba: Sequence[float]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A body's shape and its pose in the link.
-
-    ``size``: box x, y, z · cylinder and capsule radius, length (a capsule's without its ends) ·
-    sphere radius · mesh its scale along x, y, z.
-    """
+    """A body's shape and its pose in the link."""
 
     kind: Literal["box", "cylinder", "sphere", "capsule", "mesh"]
+    #: In metres. Box: x, y, z. Cylinder and capsule: radius, length (a capsule's without its
+    #: ends). Sphere: radius. Mesh: its scale along x, y, z.
     size: tuple[float, ...]
     pose: Pose
     material: Material | None = None
@@ -78,32 +74,32 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Mass in kg, pose of the centre of mass in the link, and tensor about it.
+    """Mass, centre of mass and inertia of a link."""
 
-    The tensor is (xx, xy, xz, yy, yz, zz).
-
-    ``of_shapes`` holds, where the tensor was given, the traces of those that the visual and the
-    collision shapes would have at one density. The trace is the same in all axes. ``mass_at`` is
-    the place of the mass, or of the density that it follows from.
-    """
-
+    #: In kg.
     mass: float
+    #: The pose of the centre of mass in the link.
     pose: Pose
+    #: About the centre of mass, in kg m²: xx, xy, xz, yy, yz, zz.
     tensor: tuple[float, float, float, float, float, float]
+    #: If the tensor was given: the traces that the visual and the collision shapes would have at
+    #: one density. A trace does not depend on the axes.
     of_shapes: tuple[float, ...] = ()
     span: Span | None = None
+    #: The span of the mass, or of the density that it follows from.
     mass_at: Span | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """The body on a frame. ``has_mass``: a mass was given, even without an inertia."""
+    """The body on a frame."""
 
     name: str
     span: Span
     visuals: tuple[Shape, ...] = ()
     collisions: tuple[Shape, ...] = ()
     inertial: Inertial | None = None
+    #: Whether a mass was given, even without an inertia.
     has_mass: bool = False
 
 

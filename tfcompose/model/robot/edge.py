@@ -89,20 +89,20 @@ ROUNDED = 2e-3
 
 @dataclass(frozen=True, slots=True)
 class Joint(PlanJoint):
-    """A joint of the plan, with what only the compiler knows of it.
+    """A joint of the plan, with what only the compiler needs.
 
-    The axis of a planar one is the plane's normal.
-
-    ``axis_length`` is that of the axis as it was written, ``axis_at`` its place, None where it is
-    the default, ``limit_at`` the place of the limits, and ``mimic_at`` that of the joint that it
-    follows.
+    The axis of a planar joint is the plane's normal.
     """
 
     span: Span = field(kw_only=True)
+    #: The span of the joint that it follows.
     mimic_at: Span | None = field(default=None, kw_only=True)
     limit: Limit | None = field(default=None, kw_only=True)
+    #: The span of the limits.
     limit_at: Span | None = field(default=None, compare=False, kw_only=True)
+    #: The length of the axis in the file.
     axis_length: float = field(default=1.0, kw_only=True)
+    #: The span of the axis; None: the default axis.
     axis_at: Span | None = field(default=None, compare=False, kw_only=True)
     dynamics: Dynamics | None = field(default=None, kw_only=True)
     safety: SafetyController | None = field(default=None, kw_only=True)
@@ -128,24 +128,25 @@ class Joint(PlanJoint):
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """A pose that was measured: that of ``child`` in ``parent``, frames of the robot.
-
-    ``nominal`` is the same by the pose that is written beside it, if one is. ``named_at`` is the
-    place in the robot file, ``span`` the entry in the calibration file, ``entry`` its pose as it
-    is there; ``inverted`` says that it was taken the other way round. The limits (m, rad) say how
-    far from nominal is too far.
-    """
+    """A measured pose of ``child`` in ``parent``, frames of the robot."""
 
     parent: str
     child: str
     pose: Pose
+    #: The pose as the calibration file has it.
     entry: Pose
+    #: The entry in the calibration file.
     span: Span
     format: str
+    #: The span in the robot file.
     named_at: Span
+    #: How far from nominal is too far, in metres.
     limit_m: float
+    #: How far from nominal is too far, in radians.
     limit_rad: float
+    #: Whether the entry was used the other way round.
     inverted: bool = False
+    #: The same pose from the robot file, if it has one.
     nominal: Pose | None = None
 
     @property
@@ -172,35 +173,37 @@ _NEARLY = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Edge(PlanEdge):
-    """An edge of the plan, with what only the compiler knows of it.
+    """An edge of the plan, with what only the compiler needs."""
 
-    ``span`` is where it was written, ``source`` the line of that, and ``entry`` the path of the
-    mapping that gives it: of an edge inside a part it begins with the part's own. ``node`` is
-    empty where the owner has one node. ``joint`` moves by joint states. ``free`` is a planar or
-    floating joint, of which joint states say nothing. ``other_axes``: the vendor's name for the
-    frame does not say whether it is optical, or says it wrongly. ``optical_edits`` returns the
-    edits of the file that give the edge the optical rotation of REP-103; none where that is not
-    safe. ``xyz_at`` is where its position was written, if it was.
-    """
-
+    #: Empty: the one node of the owner.
     node: str = field(default="", kw_only=True)
     rate: float | None = field(default=None, kw_only=True)
+    #: The line of ``span``.
     source: SourceLine = field(init=False, compare=False, repr=False)
+    #: The joint whose states move the edge.
     joint: Joint | None = field(default=None, kw_only=True)
+    #: Where the edge is declared.
     span: Span = field(kw_only=True)
     joint_name: str = field(default="", kw_only=True)
     given: bool = field(default=True, kw_only=True)
+    #: The path of the mapping that declares it; for an edge inside a part it begins with the
+    #: part's own.
     entry: tuple[str | int, ...] = field(default=(), compare=False, kw_only=True)
     owner_at: Span | None = field(default=None, kw_only=True)
     child_at: Span | None = field(default=None, kw_only=True)
     joint_at: Span | None = field(default=None, kw_only=True)
+    #: The span of its position, if it has one.
     xyz_at: Span | None = field(default=None, kw_only=True)
     sensor: str | None = field(default=None, kw_only=True)
     nominal: bool = field(default=False, kw_only=True)
     rate_at: Span | None = field(default=None, kw_only=True)
     calibration: Calibration | None = field(default=None, kw_only=True)
+    #: A planar or floating joint, which joint states cannot move.
     free: Joint | None = field(default=None, kw_only=True)
+    #: Whether the vendor's name for the frame does not say, or says wrongly, that it is optical.
     other_axes: bool = field(default=False, kw_only=True)
+    #: Returns edits of the file that give the edge the optical rotation of REP-103; none if that
+    #: is not safe.
     optical_edits: Callable[[], tuple[Edit, ...]] = field(
         default=tuple, compare=False, repr=False, kw_only=True
     )

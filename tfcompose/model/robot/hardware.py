@@ -61,14 +61,12 @@ _QUOTES = {'"': "&quot;", "'": "&#x27;"}
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Elements that stand in the URDF as the user wrote them.
-
-    ``places`` are theirs, in order, if known.
-    """
+    """Elements that stand in the URDF as the user wrote them."""
 
     name: str
     span: Span
     text: str
+    #: Their spans, in order, if known.
     places: tuple[Span, ...] = field(default=(), compare=False)
 
     def own_names(self) -> list[str]:

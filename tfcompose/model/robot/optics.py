@@ -27,18 +27,8 @@ class OpticsSource:
 class Optics:
     """One stream of a sensor, in its frame.
 
-    What is not known is None; lengths in metres, angles in radians.
-
-    A ``camera`` looks along z of ``frame``, x right and y down (REP-103), one that is ``backward``
-    along -z with y up; every other kind looks along x, y left and z up. ``horizontal`` and
-    ``vertical`` are [from, to], counted from where the stream looks, to the left and up positive:
-    a lidar's are angles of the LaserScan and elevations of beams. ``diagonal`` is a whole angle,
-    from corner to corner, or of a fisheye's image circle. ``resolution`` is (width, height) in
-    pixels. ``near`` and ``far`` are of z for a camera that measures depth, so that its far face is
-    flat; of the distance along the ray for every other kind. ``elevations`` holds those of a
-    lidar's channels, ``samples`` how many there are in one scan or one turn, ``baseline`` the
-    distance of the two imagers that depth is computed from. A stream that is ``active`` sends the
-    light or the sound that it receives.
+    Unknown values are None. Lengths are in metres, angles in radians. A camera looks along z of
+    the frame, x right and y down (REP-103). Every other kind looks along x, y left and z up.
     """
 
     stream: str
@@ -46,18 +36,32 @@ class Optics:
     kind: OpticsKind
     span: Span
     projection: Projection = "pinhole"
+    #: A camera that looks along -z, with y up.
     backward: bool = False
+    #: [from, to], counted from the viewing direction, left positive; a lidar's are angles of the
+    #: LaserScan.
     horizontal: Sector | None = None
+    #: [from, to], counted from the viewing direction, up positive; a lidar's are elevations of
+    #: beams.
     vertical: Sector | None = None
+    #: The full angle from corner to corner, or of a fisheye's image circle.
     diagonal: float | None = None
+    #: Width and height in pixels.
     resolution: tuple[int, int] | None = None
+    #: For a camera that measures depth a value of z, so that its faces are flat; for every other
+    #: kind a distance along the ray.
     near: float | None = None
+    #: As ``near``.
     far: float | None = None
     channels: int | None = None
+    #: Elevations of a lidar's channels.
     elevations: tuple[float, ...] = ()
+    #: The number in one scan or one turn.
     samples: int | None = None
     rate: float | None = None
     shutter: Shutter | None = None
+    #: The distance of the two imagers from which depth is computed.
     baseline: float | None = None
+    #: Whether the stream emits the light or sound that it receives.
     active: bool = False
     sources: tuple[OpticsSource, ...] = ()

@@ -32,22 +32,19 @@ class AsInFile(str):
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One ROS node of a process, by its full name.
-
-    ``lifecycle`` is the state that it is brought into.
-
-    ``path`` leads to the mapping that holds its ``params``; ``contradicting`` are those, by their
-    full names, that are known to contradict the tree. ``places`` are those of the first level in
-    the robot file; of one that a parameter file gives, where that is named, and then the place in
-    it.
-    """
+    """One ROS node of a process, by its full name."""
 
     name: str
     span: Span
+    #: The path of the mapping with its parameters.
     path: tuple[str | int, ...] = ()
     params: dict[str, Any] = field(default_factory=dict)
+    #: The state that it is brought into.
     lifecycle: LifecycleState | None = None
+    #: Parameters, by full name, that are known to contradict the tree.
     contradicting: frozenset[str] = frozenset()
+    #: Spans of the top-level parameters in the robot file. For a parameter from a file: where that
+    #: file is named, and then the span in it.
     places: Mapping[str, tuple[Span, ...]] = field(default_factory=dict, compare=False)
 
     @property
@@ -109,31 +106,35 @@ def _read_as_ros(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Process(PlanProcess):
-    """A process of the plan, with what only the compiler knows of it.
+    """A process of the plan, with what only the compiler needs.
 
-    It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the
-    command ``argv``, which for the others holds the arguments, until ``to_plan`` makes the whole
-    command of them. ``part`` is the ``Part`` that it belongs to, if any. ``loads`` says that it is
-    a container of components, ``describes`` that its parameter ``robot_description`` is the URDF
-    for a stock robot_state_publisher. ``rate`` is that of the joint states that it sends.
-    ``host_at`` is where its host was named, if it was. ``all_nodes`` holds the parameters that
-    each of its nodes is given, also one that is not listed. ``other_params`` are those, and what
-    its parameter files say to nodes that are not listed, by names and patterns in their order.
+    It runs an executable of a package, a launch file, or the command ``argv``. For the first two,
+    ``argv`` has the arguments until ``to_plan`` makes a complete command.
     """
 
     nodes: tuple[str, ...] = field(init=False)
     lifecycle: dict[str, LifecycleState] = field(init=False)
     span: Span = field(kw_only=True)
     ros_nodes: tuple[Node, ...] = field(default=(), kw_only=True)
+    #: The package of ``executable``.
     package: str | None = field(default=None, kw_only=True)
     executable: str | None = field(default=None, kw_only=True)
+    #: A launch file: ``package/file``.
     launch: str | None = field(default=None, kw_only=True)
+    #: The rate of the joint states that it sends, in hertz.
     rate: float | None = field(default=None, kw_only=True)
+    #: The ``Part`` that it belongs to, if any.
     part: str = field(default="", kw_only=True)
+    #: Whether its parameter ``robot_description`` is the URDF, for a stock robot_state_publisher.
     describes: bool = field(default=False, kw_only=True)
+    #: Whether it is a container of components.
     loads: bool = field(default=False, kw_only=True)
+    #: The span of its host, if it names one.
     host_at: Span | None = field(default=None, kw_only=True, compare=False)
+    #: Parameters for each of its nodes, including unlisted ones.
     all_nodes: Node | None = field(default=None, kw_only=True)
+    #: Those parameters, and the ones that its parameter files give to unlisted nodes, by names and
+    #: patterns in order.
     other_params: dict[str, Any] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -196,9 +197,11 @@ class Host(PlanHost):
 
 @dataclass(frozen=True, slots=True)
 class Claim(PlanClaim):
-    """A claim of the plan, with the parameters that stop it, which ``switch`` is the text of."""
+    """A claim of the plan, with the parameters that stop it."""
 
+    #: The text of ``off``.
     switch: str = field(init=False)
+    #: Values of parameters that stop the claim.
     off: dict[str, Any] = field(kw_only=True)
 
     def __post_init__(self) -> None:

@@ -35,16 +35,7 @@ def is_optical(frame: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class MountedSensor:
-    """A sensor as the rules see it: the frames that it brings, and its driver.
-
-    ``driver`` is the name of the driver's process, empty without one; ``switch`` holds the
-    parameters that keep the driver from publishing frames (None: there are none), ``publishes``
-    says that it may, ``by_default`` that it does where no parameter says so. ``claims`` are the
-    edges outside the sensor that it publishes by default and does not own, each with the
-    parameters that keep it from that. ``serial_option`` is the preset's option for a serial
-    number, empty where it has none. ``optics`` says what each of its streams sees, as far as that
-    is known.
-    """
+    """A sensor as the rules see it: the frames that it brings, and its driver."""
 
     name: str
     preset: str
@@ -53,49 +44,57 @@ class MountedSensor:
     mount: str
     frames: tuple[str, ...] = ()
     driver_frames: tuple[str, ...] = ()
+    #: The process of its driver; empty without one.
     driver: str = ""
+    #: Parameters that keep the driver from publishing frames; None: there are none.
     switch: dict[str, Any] | None = None
+    #: Whether the driver may publish frames.
     publishes: bool = False
+    #: Edges outside the sensor that the driver publishes by default and does not own, each with
+    #: the parameters that prevent it.
     claims: dict[str, dict[str, Any]] = field(default_factory=dict)
+    #: Whether it does so if no parameter says otherwise.
     by_default: bool = True
+    #: The preset's option for a serial number; empty if it has none.
     serial_option: str = ""
     serial: str | None = None
     tf_at: Span | None = None
+    #: The field of view of each stream, as far as it is known.
     optics: tuple[Optics, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """A box that sensors have to see: its middle and lengths in ``frame``, in metres.
-
-    ``by`` names kinds of streams, or sensors, of which one has to see it; ``least`` is the part
-    that must be seen.
-    """
+    """A box that sensors have to see."""
 
     name: str
     span: Span
+    #: The frame of ``center`` and ``size``.
     frame: str
+    #: In metres.
     center: Vector
+    #: Lengths along the axes, in metres.
     size: Vector
+    #: Kinds of streams, or sensors, one of which has to see it.
     by: tuple[str, ...] = ()
+    #: The share that must be seen.
     least: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class SourceNumbers:
-    """The numbers of a pose or limit as in the source file, in SI, with their places.
+    """The numbers of a pose or limit from the source file, in SI units, with their spans."""
 
-    ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each
-    number whether it stands there with a unit, and ``locate`` where the number of an index stands.
-    ``in_part`` is the entry's name in the whole robot where the file is that of a part. ``steps``
-    are the keys or indices of the numbers, as far as they are known.
-    """
-
+    #: The path of the value: ``sensors``, ``camera``, ``rpy``.
     path: tuple[str | int, ...]
     numbers: tuple[float, ...]
+    #: For each number, whether the file gives a unit.
     with_unit: tuple[bool, ...]
+    #: Returns the span of the number with this index.
     locate: Callable[[int], Span] = field(compare=False, repr=False)
+    #: The entry's name in the complete robot, if the file is a part's.
     in_part: str = ""
+    #: Keys or indices of the numbers, as far as they are known.
     steps: tuple[str | int, ...] = ()
 
     @property
@@ -116,15 +115,13 @@ class SourceNumbers:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A tool's section of the robot file.
-
-    What it says, as its model has it, and where that stands. ``planned`` is the same as JSON, None
-    where the plan does not have it.
-    """
+    """A tool's section of the robot file, as its model has it."""
 
     name: str
     value: Any
+    #: Returns the span of a path in the section.
     locate: Callable[[tuple[str | int, ...]], Span] = field(compare=False, repr=False)
+    #: The section as JSON; None: it is not in the plan.
     planned: Any = None
 
     def span_of(self, *path: str | int) -> Span:
@@ -134,14 +131,12 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part that is a robot beside others, with its own publishers and description.
-
-    ``robot`` has the names of the part's own file; in the robot that holds it, frames and joints
-    have ``prefix`` too.
-    """
+    """A part that is a robot beside others, with its own publishers and description."""
 
     name: str
+    #: What the frames and joints of the part begin with in the robot that holds it.
     prefix: str
+    #: The part, with the names of its own file.
     robot: Robot
 
 
@@ -181,53 +176,57 @@ def _names_refused_entries(
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """One robot, resolved.
-
-    ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF
-    begins, or None where the tree has no single root; ``sensors`` are those with a known preset,
-    ``source_numbers`` the numbers of poses and limits before they became poses, ``unused`` the
-    paths of variables and arguments that nothing uses; ``args`` and ``environment`` are the values
-    that it was built with; ``source_data`` is the plain data that the robot was made from,
-    profiles laid over it; ``broken`` holds the entries (section, name) that were refused already,
-    of a part how its names begin; ``refused`` is where the refused entries of the file are.
-    ``parts`` are those that are robots of their own, ``mounted`` the root frame of each part by
-    its name, ``part_notes`` what to add to findings in a part's file. ``foreign`` are files of
-    other tools, in which nothing can be fixed here. A robot that ``is_variant`` is a file's with
-    profiles or overlays merged over it. ``zones`` are those that sensors have to see, ``limits``
-    what the file sets instead of the limits of codes, ``conditions`` those of the entries that
-    they leave out, by (section, name). ``hosts`` are the computers that it may run on, its parts'
-    among them; empty: not declared. ``sections`` are those of tools, by name.
-    """
+    """One robot, resolved."""
 
     name: str
     file: str
+    #: Every declared frame, with its span.
     frames: dict[str, Span]
     edges: tuple[Edge, ...]
     links: dict[str, Link]
     processes: tuple[Process, ...]
+    #: The root of the URDF; None: the tree has no single root.
     base: str | None
     ros: RosSettings = field(default_factory=RosSettings)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
+    #: Sensors with a known preset.
     sensors: tuple[MountedSensor, ...] = ()
+    #: The numbers of poses and limits before they became poses.
     source_numbers: tuple[SourceNumbers, ...] = field(default=(), compare=False, repr=False)
+    #: Variables and arguments that nothing uses, by (section, name).
     unused: dict[tuple[str, str], Span] = field(default_factory=dict, compare=False)
+    #: The arguments that it was built with.
     args: dict[str, ParameterValue] = field(default_factory=dict, compare=False)
+    #: The environment variables that it was built with.
     environment: dict[str, str] = field(default_factory=dict, compare=False)
+    #: The plain data that the robot was made from, with profiles merged.
     source_data: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    #: Entries (section, name) that were refused; for a part, the beginning of its names.
     broken: frozenset[tuple[str, str]] = frozenset()
     claims: tuple[Claim, ...] = ()
+    #: Parts that are robots of their own.
     parts: tuple[Part, ...] = ()
+    #: The root frame of each part, by its name.
     mounted: dict[str, str] = field(default_factory=dict, compare=False)
     hardware: tuple[Hardware, ...] = ()
     blocks: tuple[Block, ...] = ()
+    #: Files of other tools, in which nothing can be fixed here.
     foreign: frozenset[str] = field(default=frozenset(), compare=False)
+    #: Spans of refused entries of the file.
     refused: tuple[Span, ...] = field(default=(), compare=False)
+    #: Notes for findings in a part's file.
     part_notes: dict[str, list[Note]] = field(default_factory=dict, compare=False)
+    #: Whether profiles or overlays are merged over the file.
     is_variant: bool = field(default=False, compare=False)
+    #: Zones that sensors have to see.
     zones: tuple[Zone, ...] = ()
+    #: The file's limits of codes, instead of the defaults.
     limits: dict[str, float] = field(default_factory=dict, compare=False)
+    #: Conditions that left entries out, by (section, name).
     conditions: dict[tuple[str, str], str] = field(default_factory=dict, compare=False)
+    #: The computers that it may run on, including its parts'; empty: not declared.
     hosts: dict[str, Host] = field(default_factory=dict)
+    #: Sections of tools, by name.
     sections: dict[str, Section] = field(default_factory=dict, compare=False, repr=False)
 
     def final(self, frame: str) -> str:

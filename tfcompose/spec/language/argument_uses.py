@@ -20,14 +20,13 @@ _PLACES = ("env", "params", "remap")
 
 @dataclass(slots=True)
 class ArgumentUses:
-    """Where a robot file names what it is built with.
+    """Where a robot file names its arguments and variables."""
 
-    ``texts`` are those that a process is given as it starts, by process and place, ``conditions``
-    those of processes; ``fixed`` are arguments and variables that something else needs.
-    """
-
+    #: Texts that a process is given at start, by process and place.
     texts: dict[tuple[str, str], str] = field(default_factory=dict)
+    #: Conditions of processes.
     conditions: dict[str, str] = field(default_factory=dict)
+    #: Arguments and variables that something else needs.
     fixed: set[str] = field(default_factory=set)
 
     def fix(self, text: str) -> None:

@@ -251,8 +251,6 @@ _DEFAULTS: dict[type[PoseXyzQuat | PoseXyzRpy], dict[str, str]] = {
 class CalibrationEntry:
     """The pose of ``child`` in ``parent``, by the names of the file.
 
-    ``what`` is the key that holds it, if it matters.
-
     A matrix has no names.
     """
 
@@ -260,6 +258,7 @@ class CalibrationEntry:
     span: Span
     parent: str | None = None
     child: str | None = None
+    #: The key that holds it, if it matters.
     what: str = ""
 
     @property
@@ -270,14 +269,12 @@ class CalibrationEntry:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFile:
-    """What a calibration file says.
-
-    ``findings`` holds what is wrong with it, at the place that names it.
-    """
+    """The contents of a calibration file."""
 
     file: str
     format: str
     entries: tuple[CalibrationEntry, ...]
+    #: Problems, at the span that names the file.
     findings: tuple[Finding, ...]
 
 

@@ -49,19 +49,16 @@ Scope = dict[str, "Value"]
 
 @dataclass(slots=True)
 class Unfolded:
-    """A source with the entries that there are.
-
-    ``scopes`` are the values of their loops, by (section, name).
-
-    ``findings`` is what is wrong with conditions and loops, and ``refused`` are their paths.
-    ``conditions`` are those of the entries that they leave out, as they are written, by (section,
-    name).
-    """
+    """A source with the entries that remain after conditions and loops."""
 
     source: Source
+    #: The values of loop variables, by (section, name).
     scopes: dict[Path, Mapping[str, Value]] = field(default_factory=dict)
+    #: Problems with conditions and loops.
     findings: list[Finding] = field(default_factory=list)
+    #: The paths of refused conditions and loops.
     refused: list[Path] = field(default_factory=list)
+    #: Conditions that left entries out, as written, by (section, name).
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
 
 

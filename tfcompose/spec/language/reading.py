@@ -38,18 +38,18 @@ _MAX_ATTEMPTS = 50
 
 @dataclass(frozen=True, slots=True)
 class SpecRefusal:
-    """One value or key that the language does not take. ``path`` is its place.
-
-    ``on_key`` says that the key is wrong, not its value; ``other`` is the key that it conflicts
-    with. ``instead`` is the key or string that belongs there, where only one can be meant.
-    """
+    """One value or key that the language does not take."""
 
     code: str
+    #: Its path in the file.
     path: Path
     message: str
     help: str = ""
+    #: Whether the key is wrong instead of its value.
     on_key: bool = False
+    #: The key that it conflicts with.
     other: Path | None = None
+    #: The key or string that belongs there, if there is only one.
     instead: str | None = None
 
     def finding(self, source: Source) -> Finding:

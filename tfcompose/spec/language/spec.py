@@ -55,12 +55,9 @@ FIRST = "the data are as they were written"
 
 
 class Checked(Spec):
-    """A mapping of which more can be wrong than its single keys.
+    """A mapping with checks across its keys."""
 
-    Of each set in ``EXCLUSIVE`` it holds one key at most; an overlay that sets one drops the
-    others.
-    """
-
+    #: Sets of keys of which at most one may be given; an overlay that sets one drops the others.
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = ()
 
     @classmethod

@@ -33,27 +33,27 @@ M = TypeVar("M", bound=Spec)
 
 @dataclass(frozen=True, slots=True)
 class Validated:
-    """A spec without what was refused, and the findings about that.
-
-    ``refused`` are the paths of what was; ``broken`` the entries, as (section, name), that they
-    are in: what is missing because of them is not reported a second time. ``unused`` are the paths
-    of variables and arguments that nothing uses. ``source`` has the entries that conditions and
-    loops leave, and ``conditions`` are those of the others, by (section, name). ``args`` are the
-    values of the arguments that were ``given`` or are their defaults, ``environment`` those of the
-    variables that the file names. ``source_data`` is all that, and the plain data of the source:
-    what a plan's digest is made of.
-    """
+    """A spec without refused entries, and the findings about these."""
 
     spec: RobotSpec
+    #: The source with the entries that conditions and loops leave.
     source: Source
     findings: tuple[Finding, ...]
+    #: The paths of refused values.
     refused: frozenset[Path] = frozenset()
+    #: The paths of variables and arguments that nothing uses.
     unused: tuple[tuple[str, str], ...] = ()
     given: Given = _NOTHING
+    #: The values of the arguments: ``given``, or their defaults.
     args: dict[str, ParameterValue] = field(default_factory=dict)
+    #: The values of the environment variables that the file names.
     environment: dict[str, str] = field(default_factory=dict)
+    #: Conditions of the entries that were left out, by (section, name).
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
+    #: Entries with refused values, by (section, name). What is missing because of them is not
+    #: reported a second time.
     broken: frozenset[tuple[str, str]] = frozenset()
+    #: The plain data of the source with arguments and environment: the input of a plan's digest.
     source_data: dict[str, Any] = field(default_factory=dict)
 
 

@@ -36,12 +36,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """Annotates a string that has to match a pattern, in whole.
-
-    ``means`` says the pattern in words.
-    """
+    """Annotates a string that must match a pattern in full."""
 
     pattern: str
+    #: The pattern in words.
     means: str
 
     def check(self, value: str) -> str:
@@ -65,11 +63,9 @@ class Matches:
 
 @dataclass(frozen=True, slots=True)
 class Computable:
-    """Annotates a value that an expression may give.
+    """Annotates a value that an expression may give."""
 
-    ``plain`` is the function that takes it out of what that gives.
-    """
-
+    #: Converts an expression's result to the value.
     plain: Callable[[Any], Any]
 
     def __get_pydantic_core_schema__(
@@ -95,9 +91,11 @@ _OF_A_POSE = 6
 
 @dataclass(frozen=True, slots=True)
 class InARow:
-    """Annotates a tuple that is written as a list of ``count`` items, for example ``sample``."""
+    """Annotates a tuple that is written as a list."""
 
+    #: The number of items.
     count: int
+    #: An example.
     sample: str
 
     def check(self, value: Any) -> Any:

@@ -94,10 +94,7 @@ class _Part:
 
 @dataclass(slots=True)
 class _Open:
-    """A mapping or list that is being read.
-
-    ``key`` waits for its value, which ``keeps`` says to keep.
-    """
+    """A mapping or list that is being read."""
 
     data: Any
     start: yaml.CollectionStartEvent
@@ -110,8 +107,10 @@ class _Open:
     merges: tuple[tuple[Any, Location], ...] = ()
     size: int = 1
     height: int = 0
+    #: The key whose value comes next.
     key: str = ""
     is_merge: bool = False
+    #: Whether to keep that value.
     keeps: bool = True
     found_before_value: int = 0
 

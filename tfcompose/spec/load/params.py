@@ -24,20 +24,19 @@ PARAMETERS = "ros__parameters"
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A value as it was written, and where; ``plain`` without quotes."""
+    """A scalar of the file, with its span."""
 
     text: str
+    #: Whether it has no quotes.
     plain: bool
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
 class NodeParams:
-    """What a file says to the nodes that ``name`` means.
+    """The parameters in a file for the nodes that a name matches."""
 
-    A name, or a pattern with * for one part and ** for any.
-    """
-
+    #: A name, or a pattern with * for one part and ** for any.
     name: str
     span: Span
     params: dict[str, Any]

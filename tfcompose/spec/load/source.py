@@ -26,20 +26,20 @@ MOST_CHARACTERS = 4_000_000
 
 @dataclass(frozen=True, slots=True)
 class Spans:
-    """A file as every stage knows it: where each key and value is, and what was found on the way.
+    """Spans of a file: where each key and value is, and the findings so far.
 
-    ``replaced`` has the places of the values that others were laid over, by path, the last one
-    first. ``is_variant`` says that profiles or overlays are merged over the file. Spans take no
-    part in equality.
+    Spans take no part in equality.
     """
 
     file: str = field(compare=False)
     places: Location = field(compare=False)
     findings: tuple[Finding, ...] = field(default=(), compare=False, kw_only=True)
     allows: tuple[Allow, ...] = field(default=(), compare=False, kw_only=True)
+    #: Spans of values that were overwritten, by path, the last one first.
     replaced: dict[Path, tuple[Span, ...]] = field(
         default_factory=dict, compare=False, kw_only=True
     )
+    #: Whether profiles or overlays are merged over the file.
     is_variant: bool = field(default=False, compare=False, kw_only=True)
 
     def span_of(self, path: Path) -> Span:
@@ -68,13 +68,11 @@ class Spans:
 
 @dataclass(frozen=True, slots=True)
 class Source(Spans):
-    """A file's plain data, with its spans: what a spec is validated from.
+    """A file's plain data, with its spans: the input of validation."""
 
-    Aliases of one anchor are one object in ``data``, which nothing changes. ``has_nulls`` says
-    that values may be null.
-    """
-
+    #: Aliases of one anchor are one object, which nothing changes.
     data: dict[str, Any]
+    #: Whether values may be null.
     has_nulls: bool = field(default=True, compare=False, kw_only=True)
 
     def mapping(self, *path: str | int) -> dict[str, Any]:

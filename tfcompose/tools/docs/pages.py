@@ -113,9 +113,10 @@ class KeySection:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class KeysPage(SitePage):
-    """All keys of a language. ``all_keys`` has the sections that have a key: title, anchor."""
+    """All keys of a language."""
 
     sections: Sequence[KeySection]
+    #: The sections that have a key: title, anchor.
     all_keys: dict[str, list[tuple[str, str]]]
 
     @property
@@ -126,10 +127,11 @@ class KeysPage(SitePage):
 
 @dataclass(frozen=True, slots=True)
 class PageGroup:
-    """Pages under a title. ``name`` is its anchor."""
+    """Pages under a title."""
 
     title: str
     pages: Sequence[SitePage]
+    #: The anchor of the title.
     name: str = ""
     #: Folded in the list of pages, unless one of them is shown.
     is_folded: bool = False

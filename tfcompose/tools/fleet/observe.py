@@ -47,35 +47,33 @@ class StaleError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class EdgeStatus:
-    """A shared edge, by its names in the fleet.
-
-    Ages are in seconds since it was sent, None: it never came.
-
-    ``delay_s`` is its last arrival here minus its stamp, by the two computers' clocks; None for a
-    fixed edge.
-    """
+    """A shared edge, by its names in the fleet."""
 
     parent: str
     child: str
+    #: Since it was sent, in seconds; None: it never arrived.
     age_s: float | None
+    #: Its last arrival here minus its stamp, by the two computers' clocks, in seconds; None for a
+    #: fixed edge.
     delay_s: float | None
     stale: bool
 
 
 @dataclass(frozen=True, slots=True)
 class FleetRobotStatus:
-    """What is known of a robot: whether it is reached, how long ago it sent, and what it shares.
+    """The status of a robot: whether it is reached, and what it shares.
 
-    live: it sends; stale: nothing came that was sent within ``STALE_S``; silent: its router is
-    reached, and it has sent nothing yet; unreachable: its router is not. ``delay_s`` is how long
-    what came last was on its way, by the two computers' clocks.
+    live: it sends. stale: nothing arrived that was sent within ``STALE_S``. silent: its router is
+    reached, and it has sent nothing yet. unreachable: its router is not reached.
     """
 
     robot: str
     router: str
     state: LinkState
+    #: Since its last message was sent, in seconds; None: there was none.
     age_s: float | None
     edges: tuple[EdgeStatus, ...]
+    #: How long its last message took, by the two computers' clocks, in seconds.
     delay_s: float = 0.0
 
 

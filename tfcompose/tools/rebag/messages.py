@@ -74,12 +74,11 @@ def _numbers(document: Mapping[str, Any], name: str, count: int | None) -> tuple
 
 @dataclass
 class MessageEditor:
-    """Renames frames in messages, and replaces camera calibrations.
+    """Renames frames in messages, and replaces camera calibrations."""
 
-    ``renames`` are new names by old ones, ``camera_infos`` calibrations by topic.
-    """
-
+    #: New names of frames, by old name.
     renames: Mapping[str, str]
+    #: Calibrations by topic.
     camera_infos: Mapping[str, CameraInfo]
     #: Topics whose frames were not renamed, with their type: its definition is unknown.
     unknown: dict[str, str] = field(default_factory=dict)

@@ -36,10 +36,7 @@ Edit = Callable[[bytes], "bytes | None"]
 
 @dataclass
 class Rewrite:
-    """Everything that changes in a bag, over all its files.
-
-    ``compress`` and ``expand`` are for bags that compress each message.
-    """
+    """Everything that changes in a bag, over all its files."""
 
     corrections: Mapping[Topics, TFCorrection]
     messages: MessageEditor
@@ -52,7 +49,9 @@ class Rewrite:
     qos: dict[str, str] = field(default_factory=dict)
     #: The type of each topic of the bag.
     types: dict[str, str] = field(default_factory=dict)
+    #: Decompresses a message, in bags that compress each one.
     expand: Callable[[bytes], bytes] | None = None
+    #: Compresses a message, in such bags.
     compress: Callable[[bytes], bytes] | None = None
     #: TFMessages that could not be decoded, by topic; they stay as they are.
     malformed: Counter[str] = field(default_factory=Counter)

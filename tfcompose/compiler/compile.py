@@ -30,19 +30,17 @@ NOTHING = Given()
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """A robot and everything that was found.
+    """A robot and all findings about it."""
 
-    ``robot`` is None where the text did not get that far.
-
-    ``allows`` are the comments that silence findings, ``used`` those that did, with the code.
-    ``sources`` are what the robot was made from, overlays merged over it: its own file's, and
-    those of the robot files that are parts.
-    """
-
+    #: None if the text did not get that far.
     robot: Robot | None
     findings: tuple[Finding, ...]
+    #: The comments that silence findings.
     allows: tuple[Allow, ...] = ()
+    #: Those of ``allows`` that silenced a finding, with its code.
     used: frozenset[tuple[Allow, str]] = frozenset()
+    #: The robot's own source, with overlays merged over it, and those of robot files that are
+    #: parts.
     sources: tuple[Source, ...] = ()
 
     @property

@@ -21,18 +21,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A code of the catalogue, and the function that finds it.
-
-    A rule ``of_urdf`` makes sense for a robot without owners, sensors and processes, too. What
-    ``follows`` from a pose is not reported of an entry whose pose was refused. An ``idle`` rule
-    finds what has no use: where profiles or overlays are merged over a robot, the file alone may
-    use it.
-    """
+    """A code of the catalogue and the function that finds it."""
 
     code: str
     find: Find
+    #: Whether the rule also applies to a robot without owners, sensors and processes.
     of_urdf: bool = False
+    #: The value that the finding follows from. If an entry's pose was refused, rules that follow
+    #: from the pose do not report that entry.
     follows: Follows | None = None
+    #: Whether the rule reports unused entries. It is skipped when profiles or overlays are merged
+    #: over the robot, because the file alone may use them.
     idle: bool = False
 
 

@@ -13,18 +13,18 @@ Kind = Literal["static", "joint", "dynamic"]
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """An edge: in the child's box, ``detail`` follows its name, and ``pose`` is on a second line.
-
-    An ``alternative`` is a further parent between which an owner switches, as a tool changer does;
-    the layout ignores it.
-    """
+    """An edge of the picture."""
 
     parent: str
     child: str
     kind: Kind
     owner: str
+    #: Text after the child's name in its box.
     detail: str = ""
+    #: Text on the second line of the child's box.
     pose: str = ""
+    #: Whether the parent is a further one that the owner can switch to, as a tool changer does.
+    #: The layout ignores such edges.
     alternative: bool = False
 
 
@@ -38,20 +38,17 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """A tree, or what is there instead.
-
-    Several roots, second parents and cycles are drawn as they are.
-
-    Frames that edges name need not be in ``frames``. The order of frames and edges is that of the
-    picture; ``owners`` are in the order of their colours. ``hidden`` are the edges to frames that
-    are not drawn.
-    """
+    """A TF tree, or a graph with several roots, second parents or cycles, drawn as it is."""
 
     title: str
+    #: In drawing order. Frames that only edges name may be missing.
     frames: tuple[str, ...]
+    #: In drawing order.
     arrows: tuple[Arrow, ...]
     groups: tuple[Group, ...] = ()
+    #: In the order of their colours.
     owners: tuple[str, ...] = ()
+    #: The edges to frames that are not drawn.
     hidden: tuple[Arrow, ...] = ()
 
     def all_frames(self) -> list[str]:
@@ -116,16 +113,17 @@ def collapse_groups(graph: Graph) -> Graph:
 
 @dataclass(frozen=True, slots=True)
 class Forest:
-    """A graph as trees: ``order`` lists frames top to bottom, parents before descendants.
+    """A graph as trees."""
 
-    ``up`` is the arrow from a frame's parent, ``extra`` are the others, ``group`` the index of a
-    frame's group.
-    """
-
+    #: Frames from top to bottom, parents before descendants.
     order: tuple[str, ...]
+    #: The arrow from each frame's parent, by frame.
     up: dict[str, Arrow]
+    #: By parent.
     children: dict[str, list[str]]
+    #: All arrows that are not in ``up``.
     extra: tuple[Arrow, ...]
+    #: The index of a frame's group, by frame.
     group: dict[str, int]
 
     def enters(self, frame: str) -> bool:

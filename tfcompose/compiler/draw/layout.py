@@ -64,11 +64,9 @@ class FrameBox:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """The rectangle of a group, with a strip for the label on top.
+    """The rectangle of a group, with a strip for the label on top."""
 
-    ``frame`` is where the group begins.
-    """
-
+    #: The first frame of the group.
     frame: str
     x: float
     top: float

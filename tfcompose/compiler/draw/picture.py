@@ -58,13 +58,12 @@ class Box:
 
 @dataclass(slots=True)
 class Curve:
-    """Cubic curves in a row, by their points: four of the first, three more of each further one.
+    """Connected cubic Bézier curves."""
 
-    ``about`` is its description, in formats that can show one.
-    """
-
+    #: Four for the first curve, three more for each further one.
     points: tuple[Point, ...]
     style: str
+    #: A description, for formats that can show one.
     about: str = ""
 
     @property

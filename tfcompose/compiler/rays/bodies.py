@@ -21,10 +21,11 @@ Neighbours = dict[str, list[tuple[str, Pose]]]
 
 @dataclass(frozen=True, slots=True)
 class PosedShape:
-    """A shape of a link. ``pose`` is the shape's, in the frame from which it is seen."""
+    """A shape of a link."""
 
     link: str
     shape: Shape
+    #: The shape's pose in the frame from which it is seen.
     pose: Pose
 
 

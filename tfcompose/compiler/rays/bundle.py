@@ -22,15 +22,18 @@ _NO_CONE = ((0.0, 0.0, 0.0), 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Rays from the origin, and the cone around them: its axis, and cosine and sine of its half.
+    """Rays from the origin and the cone around them.
 
-    Rays that spread over half a turn or more have no cone: all three are 0. ``rays`` are numbers
-    and directions, none where ``parts`` hold them.
+    Rays that spread over half a turn or more have no cone: axis, cosine and sine are 0.
     """
 
+    #: The cone's axis, a unit vector.
     axis: Vector
+    #: Cosine of half the cone's opening angle.
     cosine: float
+    #: Sine of half the cone's opening angle.
     sine: float
+    #: Numbers and directions of the rays; empty if ``parts`` hold them.
     rays: tuple[tuple[int, Vector], ...] = ()
     parts: tuple[Bundle, ...] = ()
 

@@ -39,19 +39,18 @@ class Ray:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What rays of one stream hit, from the origin of its frame into ``directions``.
-
-    ``hits`` are the metres to the first body, and its link, by the number of the ray. ``inside``
-    are the links that the origin is in or on, and how deep in metres; their bodies block no ray: a
-    sensor that is mounted flush looks away from what it is mounted on. ``left_out`` are the links
-    of which a mesh could not be read: trimesh is not installed, or the file is no mesh.
-    """
+    """The hits of one stream's rays, cast from the origin of its frame."""
 
     sensor: str
     optics: Optics
+    #: Unit vectors in the stream's frame.
     directions: tuple[Vector, ...]
+    #: Distance to the first body in metres and that body's link, by the ray's number.
     hits: Mapping[int, tuple[float, str]]
+    #: Links that the origin is in or on, with the depth in metres. Their bodies block no ray,
+    #: because a flush-mounted sensor looks away from its mount.
     inside: Mapping[str, float]
+    #: Links with a mesh that cannot be read: trimesh is not installed, or the file is no mesh.
     left_out: tuple[str, ...] = ()
 
     @property

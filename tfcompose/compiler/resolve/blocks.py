@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _NamesOrExcused(Collection[str]):
-    """Names, with ``excuses`` for those that may be missing because of a refused entry."""
+    """Names, and names that may be missing because an entry was refused."""
 
     names: Sequence[str]
+    #: Tell whether a refused entry may have brought the name.
     excuses: Callable[[str], bool]
 
     def __contains__(self, name: object) -> bool:

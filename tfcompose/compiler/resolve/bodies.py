@@ -33,13 +33,11 @@ FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 @dataclass(slots=True)
 class Bodies:
-    """Makes links of what is written.
-
-    ``findings`` holds what is wrong with the files of meshes and textures.
-    """
+    """Make links from the spec."""
 
     spec: RobotSpec
     packages: Packages = field(default_factory=Packages)
+    #: Findings about mesh and texture files.
     findings: list[Finding] = field(default_factory=list)
     _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(
         default_factory=dict

@@ -82,9 +82,10 @@ class _Files:
 
 @dataclass(frozen=True, slots=True)
 class _Match:
-    """An entry that fits an edge; ``inverted``: its parent is the edge's child."""
+    """A calibration entry that fits an edge."""
 
     entry: CalibrationEntry
+    #: Whether the entry's parent is the edge's child.
     inverted: bool
 
     @property

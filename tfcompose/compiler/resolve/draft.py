@@ -33,49 +33,47 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Collected:
-    """What is collected from all parts of a robot, and from their parts.
-
-    ``allows`` are the comments in their files that silence findings. ``notes`` holds, for each
-    file that is a part, a note for each use that says as which part; ``sources`` are what the
-    robot files among them were resolved from.
-    """
+    """Data collected from all parts of a robot and their parts."""
 
     count: int = 0
+    #: The comments in the parts' files that silence findings.
     allows: list[Allow] = field(default_factory=list)
+    #: A note for each use of a file as a part, by file. It names the part.
     notes: dict[str, list[Note]] = field(default_factory=dict)
+    #: The sources of the robot files among the parts.
     sources: list[Source] = field(default_factory=list)
 
 
 @dataclass(slots=True)
 class Draft:
-    """One robot while it is resolved; ``holder`` is the robot that it is a part of.
-
-    ``read`` gives the text of a file; without ``disk`` no mesh and no package is looked for.
-    """
+    """One robot during resolution."""
 
     validated: Validated
     library: Library
+    #: Return the text of a file. None: no file can be read.
     read: Callable[[str], str] | None
+    #: None: meshes and packages are not looked up.
     disk: Disk | None
-    #: What the robot that holds all others collects from its parts, and from theirs.
+    #: Collected by the outermost robot from its parts and their parts.
     collected: Collected
+    #: The robot that includes this one as a part.
     holder: Draft | None = None
     #: Where its files find packages.
     packages: Packages = field(init=False)
     #: The entries (section, name) that were refused, and names that parts would have brought.
     broken: set[tuple[str, str]] = field(init=False)
-    #: Those that this file brings; those of parts are theirs.
+    #: The processes that this file adds, without those of parts.
     processes: list[Process] = field(default_factory=list)
     joined: list[Joined] = field(default_factory=list)
     frames: dict[str, Span] = field(default_factory=dict)
     joints: dict[str, Span] = field(default_factory=dict)
-    #: Their poses are those that are written until ``solve_poses`` has run.
+    #: Poses are as written until ``solve_poses`` has run.
     edges: list[Edge] = field(default_factory=list)
     #: The keys of the edges that this file writes, by index.
     keys: dict[int, EdgeKeys] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=dict)
     sensors: list[MountedSensor] = field(default_factory=list)
-    #: There is one once ``assemble`` has run.
+    #: Set by ``assemble``.
     robot: Robot = field(init=False)
 
     def __post_init__(self) -> None:

@@ -35,18 +35,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
-    """The robot of a URDF or xacro file. ``files`` are what it is written in.
-
-    ``findings`` is what is wrong with it: errors, and the files that it names and that are not
-    found. Other warnings are for those who wrote it.
-
-    ``implied`` are the frames that its joints hang on and that it does not have: the holder's,
-    where a macro makes it.
-    """
+    """The robot of a URDF or xacro file."""
 
     robot: Robot
+    #: The files that describe it.
     files: tuple[str, ...]
+    #: Errors, and files that it names but that are missing. Other warnings are for the file's
+    #: author.
     findings: tuple[Finding, ...]
+    #: Parent frames of its joints that the file does not define. They are the holder's if a macro
+    #: makes the part.
     implied: frozenset[str] = frozenset()
 
 

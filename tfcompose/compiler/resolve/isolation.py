@@ -109,9 +109,10 @@ def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
 
 @dataclass(slots=True)
 class _ProcessFiller:
-    """Fills in processes; ``findings`` is what cannot be."""
+    """Fill in the frames and files that processes name."""
 
     draft: Draft
+    #: Findings about names that cannot be filled in.
     findings: list[Finding] = field(default_factory=list)
 
     def fill(self, process: Process) -> Process:

@@ -26,17 +26,14 @@ _PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """A part as its holder sees it.
-
-    ``root`` is the frame that is bolted on, None if there is no single one.
-
-    ``shared`` are those of its frames that are the holder's too.
-    """
+    """A part as its holder sees it."""
 
     name: str
     declared: PartSpec
     robot: Robot
+    #: The frame that is attached to the holder; None if there is no single root.
     root: str | None
+    #: Frames of the part that are also the holder's.
     shared: frozenset[str]
 
 

@@ -99,15 +99,13 @@ class _UnsolvableError(Exception):
 
 @dataclass(slots=True)
 class _Solver:
-    """Solves the edges of one draft, by index; ``findings`` holds what could not be solved.
-
-    ``excuses`` tells of a frame whether it, or the edge above it, may be missing because an entry
-    was refused.
-    """
+    """Solve the edges of one draft, by index."""
 
     draft: Draft
     edges: list[Edge]
+    #: Tell whether a frame, or the edge above it, may be missing because an entry was refused.
     excuses: Callable[[str], bool]
+    #: Findings about edges that cannot be solved.
     findings: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
     _open: list[int] = field(default_factory=list)

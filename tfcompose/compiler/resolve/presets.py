@@ -42,15 +42,13 @@ DRIVER, TFCOMPOSE = "driver", "tfcompose"
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A sensor with its preset, and its options decided.
-
-    ``tf`` is who publishes the frames that a driver can.
-    """
+    """A sensor with its preset and the values of its options."""
 
     name: str
     spec: SensorSpec
     preset: PresetSpec
     options: dict[str, Any]
+    #: The publisher of the frames that a driver can publish.
     tf: str = TFCOMPOSE
 
     def fill_name(self, pattern: str) -> str:

@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What the names of a part become in the robot that holds it.
+    """Names of a part's entries in the robot that holds it."""
 
-    Frames and joints get ``prefix``, frames in ``shared`` stay; processes and sensors are below
-    the part's name. A part that is ``alone`` brings its own ``static`` and ``joints``; else the
-    holder's do their work.
-    """
-
+    #: The part's name. It is put in front of the names of processes and sensors.
     part: str
+    #: Put in front of frames and joints.
     prefix: str
+    #: Frames that keep their names.
     shared: frozenset[str]
+    #: Whether the part has its own ``static`` and ``joints``. Otherwise the holder's publish its
+    #: edges.
     alone: bool
 
     def frame(self, name: str) -> str:

@@ -25,16 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ToolSection:
-    """A tool's section of a robot file, as the tool's hooks get it.
-
-    ``value`` is what it says, validated by the key's model; ``spec`` is the whole file with its
-    spans. ``read`` returns the text of a file or raises RejectedError; None where no file
-    can be read.
-    """
+    """A tool's section of a robot file, as the tool's hooks get it."""
 
     key: Key
+    #: The section's value, validated by the key's model.
     value: Any
+    #: The whole file with its spans.
     spec: RobotSpec
+    #: Return the text of a file or raise RejectedError. None: no file can be read.
     read: Callable[[str], str] | None
 
     def span_of(self, *path: str | int) -> Span:

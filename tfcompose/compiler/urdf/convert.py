@@ -78,16 +78,14 @@ _BOUNDS = (Limit, SafetyController)
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """The robot that a URDF describes, right or wrong, and what was found while reading it.
-
-    ``of_elements`` is about links and joints, ``of_blocks`` about elements that are kept as they
-    are, and ``of_files`` about meshes and textures, of which those that are not here may be
-    elsewhere.
-    """
+    """The robot that a URDF describes, valid or not, and the findings from reading it."""
 
     robot: Robot
+    #: About links and joints.
     of_elements: tuple[Finding, ...]
+    #: About elements that are kept verbatim.
     of_blocks: tuple[Finding, ...]
+    #: About meshes and textures. A file that is missing here may exist on another computer.
     of_files: tuple[Finding, ...]
 
     @property
@@ -345,11 +343,12 @@ def _numbers(
 
 @dataclass
 class _Bodies:
-    """Reads the links of a document; ``findings`` holds what is wrong with their files."""
+    """Read the links of a document."""
 
     values: AttributeReader
     find: Callable[[str, Span], tuple[Asset, Finding | None]]
     root: Element
+    #: Findings about mesh and texture files.
     findings: list[Finding] = field(default_factory=list)
     _materials: dict[str, Material | None] = field(default_factory=dict)
     _elements: dict[str, list[Element]] = field(default_factory=dict)

@@ -296,18 +296,17 @@ def _in_call(finding: Finding, file: str, use: Use) -> Finding:
 
 @dataclass(frozen=True, slots=True)
 class _Stop:
-    """Why xacro stopped.
-
-    ``files`` are those that were being read, the innermost last, and so are ``macros``, each with
-    its file. ``error`` is where XML is broken, ``at`` the element that xacro was busy with: file,
-    line, and column, which counts from 0.
-    """
+    """The reason why xacro stopped, and the place."""
 
     kind: str
     reason: str
+    #: The files that were being read, innermost last.
     files: list[str]
+    #: The macros that were being expanded, innermost last, each with its file.
     macros: list[tuple[str, str]]
+    #: The place of broken XML: file, line, column from 0.
     error: tuple[str, int, int] | None
+    #: The element that xacro was evaluating: file, line, column from 0.
     at: tuple[str, int, int] | None
 
     @classmethod

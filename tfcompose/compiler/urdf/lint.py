@@ -41,13 +41,11 @@ def lint_urdf(
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A URDF that was read: its elements, and what they describe.
-
-    ``allows`` are the comments in it, and in the files that it includes, that allow findings.
-    """
+    """A URDF with its elements and the robot they describe."""
 
     root: Element
     converted: Converted
+    #: Comments in the file and its includes that allow findings.
     allows: tuple[Allow, ...]
 
     @property

@@ -50,20 +50,19 @@ def _reject_expansion(file: str, *_: object) -> Expansion:
 
 @dataclass(frozen=True, slots=True)
 class Disk:
-    """What a compiler may ask about files. ``prefixes`` are those of AMENT_PREFIX_PATH, in order.
-
-    ``expand`` gives what xacro makes of a file, with arguments, or of what a robot file uses of
-    it. ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with
-    the finding's parts. ``is_pointer`` tells whether a file is a pointer that Git LFS has yet to
-    replace by the file itself.
-    """
+    """Access to files and packages for a compiler."""
 
     read: Callable[[str], str]
     is_file: Callable[[str], bool]
     is_folder: Callable[[str], bool]
+    #: The entries of AMENT_PREFIX_PATH, in order.
     prefixes: tuple[str, ...] = ()
+    #: Return the moments of a mesh file at a scale. Raises ``UnmeasurableError`` with the parts of
+    #: the finding.
     moments: Callable[[str, Vector], Moments] | None = None
+    #: Expand a xacro file with arguments, or a robot file's use of it.
     expand: Callable[[str, Packages, Mapping[str, Any], Use | None], Expansion] = _reject_expansion
+    #: Whether the file is a Git LFS pointer instead of the content.
     is_pointer: Callable[[str], bool] = lambda _: False
     #: Whether a file may be read at all.
     allows: Callable[[str], bool] = lambda _: True
@@ -71,18 +70,15 @@ class Disk:
 
 @dataclass(slots=True)
 class Packages:
-    """Finds packages and addressed files.
-
-    ``named`` are those that the robot names: name → folder and its place.
-
-    ``advice`` says what to do where a package is not found. ``local`` are the packages, with their
-    folders, that were found nowhere else than around the file that addresses something in them, as
-    in a source tree that is not built.
-    """
+    """Find packages and addressed files."""
 
     disk: Disk | None = None
+    #: The robot file's ``packages:``: name → folder and its place.
     named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
+    #: Help for a package that is not found.
     advice: str = "add packages: {{{name}: FOLDER}}, or source the workspace's setup file"
+    #: Packages, with their folders, that were found only around the file that addresses them, as
+    #: in a source tree that is not built.
     local: dict[str, str] = field(default_factory=dict)
     _above: dict[str, tuple[str, str]] = field(default_factory=dict)
     _missed: set[tuple[str, str]] = field(default_factory=set)

@@ -143,13 +143,12 @@ HUGE = 1e30
 
 @dataclass(slots=True)
 class AttributeReader:
-    """Reads attributes; ``findings`` collects faults, ``has_quaternions`` allows quat_xyzw.
-
-    ``refused`` counts what is no value; what is a warning only leaves a value as it is.
-    """
+    """Read attributes and collect findings about them."""
 
     findings: list[Finding] = field(default_factory=list)
+    #: Whether quat_xyzw is allowed.
     has_quaternions: bool = False
+    #: The number of invalid values. A warning is not counted, because its value is kept.
     refused: int = 0
 
     def refuse(

@@ -22,34 +22,33 @@ _PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 
 @dataclass(frozen=True, slots=True)
 class Expansion:
-    """What xacro makes of a file, with where that is written.
-
-    ``places`` are those of the elements, in the order of the text: a file of ``files``, by its
-    number, a line, and a column, which counts from 0; None for an element that is in no file.
-    ``comments`` are those of comments that allow findings, and were kept.
-    """
+    """The expanded text of a xacro file, and the places where it was written."""
 
     text: str
+    #: The files that ``places`` and ``comments`` refer to by index.
     files: tuple[str, ...]
+    #: The place of each element in the order of the text: file index, line, column from 0. None
+    #: for an element that is in no file.
     places: tuple[tuple[int, int, int] | None, ...]
+    #: The places of the comments that allow findings and were kept.
     comments: tuple[tuple[int, int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """How a robot file uses a xacro file, ``span`` a place.
+    """A robot file's use of a xacro file, as a whole or through one macro."""
 
-    As a whole, or a call of a ``macro`` that is defined there.
-
-    The macro's parameters are words, of which ``places`` holds where they are given, and blocks of
-    XML; ``files`` are what is included for it.
-    """
-
+    #: The place that names the file, in the robot file or on the command line.
     span: Span
+    #: A macro that the file defines; empty: the whole file.
     macro: str = ""
+    #: The macro's text parameters, by name.
     words: dict[str, str] = field(default_factory=dict)
+    #: The macro's block parameters, as XML.
     blocks: tuple[str, ...] = ()
+    #: Files that the macro needs included.
     files: tuple[str, ...] = ()
+    #: The place in the robot file of each entry of ``words``, by name.
     places: dict[str, Span] = field(default_factory=dict)
 
 

@@ -38,18 +38,21 @@ START = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the agent is given first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name.
+    """The agent's settings, sent before any request."""
 
-    ``sourcing`` is the line of bash that sources the files before ``--``, and becomes the command
-    behind it; ``program`` is the code with which Python starts tfcompose.
-    """
-
+    #: ROBOT.HOST.
     name: str
+    #: The unit's file name.
     unit: str
     python: str = "python3"
+    #: Setup files to source, in order.
     setup: tuple[str, ...] = ()
+    #: Whether the unit belongs to the system's systemd instead of the user's.
     system: bool = False
+    #: The line of bash that sources the files before ``--`` and then executes the command after
+    #: it.
     sourcing: str = SOURCING
+    #: The Python code that starts tfcompose.
     program: str = ANYWHERE
 
 

@@ -42,13 +42,10 @@ _WORD = re.compile(rb"[A-Za-z0-9_./ -]+\.[A-Za-z0-9]+")
 
 @dataclass(frozen=True, slots=True)
 class _Packing(Target):
-    """Addresses files by where they are in the release.
+    """Address files by their places in the release."""
 
-    ``places`` says where that is, by their absolute paths.
-
-    What is not among ``places`` yet is noted there without one.
-    """
-
+    #: The path in the release of each file, by its absolute path here. Empty for a file that has
+    #: no place yet.
     places: dict[str, str] = field(default_factory=dict)
 
     def address(self, asset: Asset) -> str:
@@ -69,14 +66,14 @@ class _Packing(Target):
 class Release:
     """The files of a release, by their paths in its folder.
 
-    ``texts`` are built, ``copies`` are where they lie here.
-
-    Its name is made of their content, so that the same content has the same name wherever it was
+    Its name is derived from their content: the same content has the same name wherever it is
     built.
     """
 
     plan: Plan
+    #: Built files.
     texts: Mapping[str, str]
+    #: Copied files, with their paths on this computer.
     copies: Mapping[str, Path]
 
     @cached_property

@@ -53,35 +53,38 @@ NAMED_AT_MOST = 8
 
 @dataclass(frozen=True, slots=True)
 class DeployTarget:
-    """Targets of a deployment: the plan's hosts, their places in the file, and options.
-
-    ``is_complete`` says that these are all hosts that have processes; ``clock_limit_s`` is by how
-    much clocks may differ.
-    """
+    """The hosts and options of a deployment."""
 
     plan: Plan
+    #: By name.
     hosts: Mapping[str, PlanHost]
+    #: The hosts' places in the robot file.
     places: Mapping[str, Span]
+    #: Whether units belong to the system's systemd instead of the user's.
     system: bool = False
+    #: Whether these are all the hosts that run processes.
     is_complete: bool = True
+    #: The largest accepted difference between clocks.
     clock_limit_s: float = 0.1
     timeout_s: float = 60.0
+    #: Whether to wait until every edge is live.
     waits: bool = True
 
 
 @dataclass(slots=True)
 class Share:
-    """A host while it is deployed to: what it has, and what it is to have.
-
-    ``follows`` says that its launcher can change to the release while it runs.
-    """
+    """A host during a deployment: its current and its future release."""
 
     host: ConnectedHost
     unit: Unit
+    #: The agent's answer to ``probe``.
     probe: dict[str, Any]
+    #: The agent's answer to ``state``.
     state: dict[str, Any] = field(default_factory=dict)
     release: Release | None = None
+    #: The name of the release to run.
     goal: str = ""
+    #: Whether its launcher can change to the release while it runs.
     follows: bool = False
 
     @property

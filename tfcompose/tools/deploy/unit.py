@@ -13,21 +13,21 @@ STOP_S = 90
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What the unit of a robot's share on a host is made of.
+    """The systemd unit of a robot's share on a host. All paths are absolute, on the host."""
 
-    Paths are absolute, and those on the host.
-
-    ``python`` is the host's; with ``has_wheels`` the release brings its own. ``name`` is
-    ROBOT.HOST.
-    """
-
+    #: ROBOT.HOST.
     name: str
     robot: str
     host: str
+    #: The folder of the robot's releases.
     base: str
+    #: The host's Python. Not used if ``has_wheels``.
     python: str
+    #: Setup files to source, in order.
     setup: tuple[str, ...] = ()
+    #: Whether the unit belongs to the system's systemd instead of the user's.
     system: bool = False
+    #: Whether the release has its own Python environment.
     has_wheels: bool = False
 
     @property

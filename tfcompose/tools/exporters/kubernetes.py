@@ -59,12 +59,10 @@ _CONTENT = "tfcompose/content"
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """Where the pods run: their image, and the plan's folder on each node.
-
-    Without ``folder`` a ConfigMap holds it.
-    """
+    """The environment of the pods."""
 
     image: str
+    #: The plan's folder on each node; empty: a ConfigMap holds the plan.
     folder: str = ""
 
 

@@ -35,16 +35,15 @@ _TRUTHS = ("true", "false")
 
 @dataclass(frozen=True, slots=True)
 class LaunchArgument:
-    """A launch argument. ``kind`` is bool, int, float or string.
-
-    ``env`` a variable that gives the default.
-    """
+    """A launch argument."""
 
     name: str
+    #: bool, int, float or string.
     kind: str
     default: str
     choices: tuple[str, ...] = ()
     description: str = ""
+    #: An environment variable that gives the default.
     env: str | None = None
 
     def code(self) -> CodeBlock:
@@ -82,17 +81,16 @@ Text = tuple[str | ArgumentValue | VariableValue, ...]
 
 @dataclass(frozen=True, slots=True)
 class LaunchValues:
-    """What a launch file decides itself.
-
-    ``conditions`` are expressions by process, ``texts`` what processes are told, by process and
-    then by place: ``args.0``, ``env.NAME``, ``params.NAME`` or ``remap.NAME``. ``more`` are
-    processes that are in other combinations of the arguments' values alone; their parameter files
-    stand beside the launch file.
-    """
+    """Values that a launch file decides at its start."""
 
     arguments: tuple[LaunchArgument, ...] = ()
+    #: Expressions, by process.
     conditions: Mapping[str, str] = field(default_factory=dict)
+    #: Texts by process and then by place: ``args.0``, ``env.NAME``, ``params.NAME`` or
+    #: ``remap.NAME``.
     texts: Mapping[str, Mapping[str, Text]] = field(default_factory=dict)
+    #: Processes that exist only for other values of the arguments. Their parameter files are next
+    #: to the launch file.
     more: tuple[PlanProcess, ...] = ()
 
     @property

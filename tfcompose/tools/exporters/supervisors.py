@@ -36,13 +36,12 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_.]+")
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """Where an export runs: plan folder, Python, setup files, variables, image.
+    """The environment in which an export runs."""
 
-    ``folder`` is absolute for systemd, and relative to the written file for the others.
-    """
-
+    #: The plan's folder: absolute for systemd, relative to the written file for the others.
     folder: str
     python: str = "python3"
+    #: Setup files to source, in order.
     setup: tuple[str, ...] = ()
     env: dict[str, str] = field(default_factory=dict)
     image: str = ""

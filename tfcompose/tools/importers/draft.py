@@ -60,32 +60,32 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 
 @dataclass(slots=True)
 class ImportDraft:
-    """A robot file in the making.
-
-    ``sections`` hold plain data as in a robot file, ``notes`` the comments above entries,
-    ``findings`` what is not imported: each of those is a comment as well. ``head`` are comments
-    above everything, ``base`` the robot's base where it is not the usual one. ``brought`` are
-    frames that sensors bring: they are no roots. With ``has_unknown_frames`` there are parts that
-    bring others, whose names are not known.
-    """
+    """A robot file in the making."""
 
     robot: str
+    #: Comments at the top of the file.
     head: list[str] = field(default_factory=list)
+    #: The robot's base if it is not the default.
     base: str | None = None
+    #: Plain data, as in a robot file.
     sections: dict[str, dict[str, Any]] = field(
         default_factory=lambda: {name: {} for name in SECTIONS}
     )
+    #: Comments above entries.
     notes: dict[Entry, list[str]] = field(default_factory=dict)
+    #: What is not imported. Each finding is also a comment.
     findings: list[Finding] = field(default_factory=list)
+    #: Frames that sensors add. They are no roots.
     brought: set[str] = field(default_factory=set)
+    #: Whether parts add frames whose names are unknown here.
     has_unknown_frames: bool = False
-    #: The files that the source may have read: all those that a user names.
+    #: The files that the source may read; by default all files that a user names.
     reach: Reach = field(default_factory=lambda: Reach(everything=True))
-    #: Texts of files that the source makes when it is started, by the paths that stand for them.
+    #: Texts of files that the source writes when it starts, by their placeholder paths.
     made: dict[str, str] = field(default_factory=dict)
-    #: Those of them that the robot file names, by their paths from its folder.
+    #: Texts of those files that the robot file names, by their paths from its folder.
     neighbours: dict[str, str] = field(default_factory=dict)
-    #: Those of ``made`` that are among them.
+    #: The placeholder paths of files in ``neighbours``.
     used: set[str] = field(default_factory=set)
     #: Each process with its use_sim_time, None where the source does not set it, and its place.
     clocks: list[tuple[str, Any, Span | None]] = field(default_factory=list)

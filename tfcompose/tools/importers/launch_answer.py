@@ -32,21 +32,21 @@ _LARGEST = 1e9
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """A launch file to be read, and its text.
-
-    ``arguments`` are its launch arguments, ``packages`` folders of packages that are not
-    installed, ``prefixes`` those of AMENT_PREFIX_PATH. With ``every_branch`` conditions do not
-    count. ``shown`` is how findings call the file, unless by its name. A file that ``is_trusted``
-    runs without the sandbox.
-    """
+    """A launch file to read."""
 
     file: str
     text: str
+    #: Launch arguments.
     arguments: Mapping[str, str] = field(default_factory=dict)
+    #: Folders of packages that are not installed.
     packages: Mapping[str, str] = field(default_factory=dict)
+    #: The entries of AMENT_PREFIX_PATH.
     prefixes: tuple[str, ...] = ()
+    #: Whether to ignore conditions.
     every_branch: bool = False
+    #: The file's name in findings; empty: ``file``.
     shown: str = ""
+    #: Whether to run the file without the sandbox.
     is_trusted: bool = False
     print_output: Callable[[str, str], None] = lambda _file, _text: None
     report_missing: Callable[[tuple[str, ...]], None] = lambda _: None

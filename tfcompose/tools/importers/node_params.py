@@ -50,17 +50,17 @@ def node_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft)
 
 @dataclass(frozen=True, slots=True)
 class ImportedParams:
-    """Parameters of a process as a robot file has them.
+    """Parameters of a process in the form of a robot file."""
 
-    ``common`` holds its files, and what counts before them; a node that keeps its name has its
-    ``own`` beside them. ``argv`` are those that a robot file has no key for, ``left`` says what is
-    not taken. ``clock`` is the use_sim_time that counts, None where nothing sets it.
-    """
-
+    #: Parameter files, and the parameters that override them.
     common: dict[str, Any] = field(default_factory=dict)
+    #: Parameters under the node's name, for a node that keeps its name.
     own: dict[str, Any] = field(default_factory=dict)
+    #: Arguments for parameters that a robot file has no key for.
     argv: list[str] = field(default_factory=list)
+    #: Descriptions of what is not imported.
     left: list[str] = field(default_factory=list)
+    #: The effective use_sim_time; None if nothing sets it.
     clock: Any = None
 
 

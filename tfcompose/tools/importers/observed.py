@@ -42,18 +42,16 @@ _STEPS = (1, 2, 2.5, 3, 4, 5, 6, 7.5, 8, 10)
 
 @dataclass(slots=True)
 class Observed:
-    """What becomes of one observation.
-
-    ``where`` gives, by a publisher's id, on which machine and as which process it runs;
-    ``words_of`` the command line of a process of this machine, empty where that cannot be had.
-    ``namespace`` is that of the robot, without slashes.
-    """
+    """Import of one observation into a draft."""
 
     draft: ImportDraft
+    #: Return the machine and process of a publisher, by its id.
     where: Callable[[bytes | None], str]
+    #: Return the command line of a process on this machine; empty if it is unavailable.
     words_of: Callable[[int], Sequence[str]]
+    #: The robot's namespace, without slashes.
     namespace: str = ""
-    #: Whether the robot keeps its nodes: fixed edges of stock ones stay with those.
+    #: Whether the robot keeps its nodes. Stock nodes then keep their fixed edges.
     is_adopted: bool = False
     _owners: dict[str, str] = field(default_factory=dict)
     _poses: dict[str, Pose] = field(default_factory=dict)

@@ -18,49 +18,50 @@ CONTAINERS = "rclcpp_components"
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What a robot_state_publisher is given.
+    """The description given to a robot_state_publisher: a xacro file or a URDF text."""
 
-    A xacro ``file`` with ``args``, or the text of a URDF.
-
-    ``prefix`` is written in front of its frames.
-    """
-
+    #: A xacro file; empty if ``text`` is given.
     file: str = ""
+    #: Arguments of the xacro file.
     args: Mapping[str, str] = field(default_factory=dict)
+    #: The text of a URDF.
     text: str = ""
+    #: Put in front of frame names (``frame_prefix``).
     prefix: str = ""
     span: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A program as the source starts it.
-
-    ``argv`` are its own arguments, or the whole command without a package; ``shell`` says that it
-    is one text for a shell. ``params`` are parameters, and names of files, in order: the last one
-    counts. ``namespace`` is absolute, or None where nothing is said. ``keys`` are further keys of
-    the process, as in a robot file; ``period_s`` is how long after the launch it is started.
-    ``todo`` is what of it could not be taken. It is a container of components if it ``loads``
-    them, and a component where it has a ``plugin``, its class. ``exact`` are the indices of
-    parameters that are given under the node's full name, others are given to every node.
-    """
+    """A program as the source starts it."""
 
     span: Span | None
     package: str | None = None
     executable: str | None = None
+    #: The program's own arguments; without a package, the whole command.
     argv: tuple[str, ...] = ()
+    #: Whether ``argv`` is one text for a shell.
     shell: bool = False
     name: str | None = None
     label: str | None = None
+    #: Absolute; None if the source sets none.
     namespace: str | None = None
+    #: Parameters and names of parameter files, in order. The last one wins.
     params: tuple[Mapping[str, Any] | str, ...] = ()
     remap: tuple[tuple[str, str], ...] = ()
     env: Mapping[str, str] = field(default_factory=dict)
+    #: Further keys of the process, as in a robot file.
     keys: Mapping[str, Any] = field(default_factory=dict)
+    #: The delay after the start of the launch.
     period_s: float = 0.0
     reader: Reader | None = None
     description: Description | None = None
+    #: Descriptions of what is not imported.
     todo: tuple[str, ...] = ()
+    #: Whether it is a container that loads components.
     loads: bool = False
+    #: The class of a component; empty for other programs.
     plugin: str = ""
+    #: Indices of ``params`` that are given under the node's full name. The others apply to every
+    #: node.
     exact: range = range(0)

@@ -46,21 +46,21 @@ MOVER = "mover"
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """A robot on its way into a robot file.
-
-    ``name`` is its name there, ``target`` where that file will be. ``notes`` say of each entry
-    what of it is left out, and why. ``rpy`` has the angles (rad) by which the source has
-    rotations; ``packages`` are folders of packages, as the robot file is to name them; ``rules``
-    are the levels of findings that the source gives reason for.
-    """
+    """A robot to be written as a robot file."""
 
     robot: Robot
+    #: The robot's name in the file.
     name: str
+    #: Where the file will be written.
     target: Target
     sensors: tuple[Recognised, ...] = ()
+    #: Comments by entry: what is left out, and why.
     notes: Mapping[Entry, Iterable[str]] = field(default_factory=dict)
+    #: The source's roll, pitch and yaw (rad), by rotation.
     rpy: Mapping[Quaternion, Vector] = field(default_factory=dict)
+    #: Folders of packages, as the robot file names them.
     packages: Mapping[str, str] = field(default_factory=dict)
+    #: Severities of findings that the source justifies, by code.
     rules: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -49,26 +49,26 @@ _MOST_NAMED = 8
 
 @dataclass(frozen=True, slots=True)
 class Recognised:
-    """A sensor that a preset describes.
-
-    ``mount`` is its edge, ``inside`` the edges to the frames that it brings.
-
-    ``own_xyz`` and ``own_rotation`` are those of its frames whose position, or rotation, is not
-    the preset's to the last digit. ``body`` is the frame on which the preset has a body, empty
-    without one; ``driven`` tells whether the preset starts a driver, which can publish the frames
-    ``sent``. ``names`` are those that frames have in the preset, where these are others.
-    """
+    """A sensor that a preset describes."""
 
     name: str
     preset: str
+    #: The edge to the sensor.
     mount: Edge
+    #: The edges to the sensor's inner frames.
     inside: tuple[Edge, ...]
     options: dict[str, Any] = field(default_factory=dict)
+    #: Frames whose position differs from the preset's.
     own_xyz: frozenset[str] = frozenset()
+    #: Frames whose rotation differs from the preset's.
     own_rotation: frozenset[str] = frozenset()
+    #: The frame on which the preset has a body; empty if it has none.
     body: str = ""
+    #: Whether the preset starts a driver.
     driven: bool = False
+    #: The preset's names of frames that have other names here.
     names: dict[str, str] = field(default_factory=dict)
+    #: Frames that the driver can publish.
     sent: frozenset[str] = frozenset()
 
     @property
@@ -79,9 +79,10 @@ class Recognised:
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """One way in which a preset fits; ``usual`` counts the options that are as by default."""
+    """One way in which a preset fits."""
 
     sensor: Recognised
+    #: The number of options that have their defaults.
     usual: int
 
     @property
@@ -93,16 +94,14 @@ class _Fit:
 
 @dataclass(frozen=True, slots=True)
 class _FrameMatch:
-    """A frame of a preset in the robot.
-
-    Its edge, and whether its position and rotation are its own.
-
-    ``tells`` is whether its pose is one that not every sensor has.
-    """
+    """A preset's frame found in the robot."""
 
     edge: Edge
+    #: Whether the position differs from the preset's.
     own_xyz: bool
+    #: Whether the rotation differs from the preset's.
     own_rotation: bool
+    #: Whether the pose identifies the sensor: few other sensors have it.
     tells: bool
 
 

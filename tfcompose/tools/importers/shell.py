@@ -144,16 +144,16 @@ _LEADING = frozenset({"then", "else", "do", "{", "(", "!"})
 
 @dataclass(frozen=True, slots=True)
 class ShellCommand:
-    """A simple command: its words with quotes removed, its text as it stands, and its line.
+    """A simple command of a script."""
 
-    ``unknown`` holds what of the words only a shell can know. ``piped`` is whether it is one of
-    several in a pipe.
-    """
-
+    #: Quotes are removed.
     words: tuple[str, ...]
+    #: As written.
     text: str
     line: int
+    #: Parts of the words that only a shell can evaluate.
     unknown: tuple[str, ...] = ()
+    #: Whether the command is part of a pipe.
     piped: bool = False
 
 

@@ -50,17 +50,14 @@ class ArgumentsRefusedError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class StaticTransform:
-    """A fixed edge as its publisher is told it.
-
-    ``rpy`` (rad) is None where it is told a quaternion.
-
-    ``order`` says in which order the arguments stand, empty where they have names.
-    """
+    """A fixed edge from the arguments of its publisher."""
 
     parent: str
     child: str
     pose: Pose
+    #: Radians; None if the arguments give a quaternion.
     rpy: Vector | None
+    #: The order of positional arguments, in words; empty if the arguments are named.
     order: str
 
     def keys(self) -> dict[str, Any]:

@@ -31,9 +31,11 @@ _FILLED = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The sphere around what a scene shows: ``middle`` (3,) and ``radius`` in metres."""
+    """The sphere around the contents of a scene."""
 
+    #: Shape (3,), in metres.
     middle: Any
+    #: In metres.
     radius: float
 
     @classmethod

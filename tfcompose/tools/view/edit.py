@@ -61,15 +61,14 @@ class MountEdits:
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """Why the pose is not edited at its place, and the values for an overlay.
+    """A pose that cannot be edited in its file, and values for an overlay instead."""
 
-    ``entry`` leads to the mapping that they belong to; it is empty where no overlay reaches. None
-    removes a key.
-    """
-
+    #: Why the pose cannot be edited.
     reason: str
     span: Span
+    #: The path of the mapping that the values belong to; empty if no overlay can set them.
     entry: Path
+    #: None removes a key.
     values: Mapping[str, str | None]
 
     def overlay(self, text: str, file: str) -> str:
@@ -79,20 +78,20 @@ class Elsewhere:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """The pose that a file gives for one edge.
-
-    That of a frame, the ``place``, in a frame it is ``relative_to``.
-
-    ``parent_from_base`` is the pose of the latter in the edge's parent, ``child_from_place`` that
-    of the former in the edge's child.
-    """
+    """The pose that a file gives for one edge."""
 
     edge: Edge
+    #: The path of the entry in the robot file.
     entry: Path
+    #: The entry's mapping.
     data: Mapping[str, Any]
+    #: The frame whose pose the file gives.
     place: str
+    #: The frame in which the file gives it.
     relative_to: str
+    #: The pose of ``relative_to`` in the edge's parent.
     parent_from_base: Pose
+    #: The pose of ``place`` in the edge's child.
     child_from_place: Pose
 
     @property

@@ -20,13 +20,12 @@ _OPEN_ROWS = 40
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of the tree; the root is at depth 0.
-
-    ``is_open`` is None where nothing is below the frame.
-    """
+    """A row of the tree."""
 
     frame: str
+    #: 0 for the root.
     depth: int
+    #: None if the frame has no children.
     is_open: bool | None
 
     @property

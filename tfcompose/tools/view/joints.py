@@ -75,24 +75,21 @@ def joint_topics(robot: Robot, plan: Plan) -> dict[str, dict[str, str]]:
 
 @dataclass(slots=True)
 class JointSender:
-    """Sends the states of joints on one topic.
+    """Sender of joint states on one topic.
 
-    It listens first, refuses if somebody else publishes there, and stops for good once somebody
+    It listens first, refuses if another node publishes there, and stops for good once another node
     does.
-
-    Attributes:
-        topic: the topic.
-        names: the joints of the robot, by their names in messages.
-        make: makes the publisher.
-        others: who else publishes on the topic: the nodes' names.
-        others_found: who did when it refused, or stopped.
     """
 
     topic: str
+    #: The robot's joints, by their names in messages.
     names: Mapping[str, str]
+    #: Make the publisher.
     make: Callable[[], PositionPublisher]
+    #: Return the names of other nodes that publish on the topic.
     others: Callable[[], Sequence[str]]
     state: Literal["waiting", "sending", "refused", "stopped"] = "waiting"
+    #: The other publishers when it refused or stopped.
     others_found: tuple[str, ...] = ()
     _begun: float | None = None
     _ask_at: float = 0.0

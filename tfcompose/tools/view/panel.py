@@ -55,18 +55,16 @@ _SWEEP_S, _SWEEP_STEP_S = 6.0, 0.05
 
 @dataclass(slots=True)
 class Window:
-    """A window among others on the same files, which save in turn.
+    """A window among others on the same files. They save in turn."""
 
-    Attributes:
-        server: where it is, which says where its camera begins; None: a server has one for all.
-        lock: held while one saves.
-        share: shows in the others what one has saved.
-        conflicts: frames that are moved here, and that another window has saved at another pose.
-    """
-
+    #: The server of the window, which sets where its camera begins; None: all windows share one
+    #: panel.
     server: viser.ViserServer | None = None
+    #: Held during a save.
     lock: threading.RLock = field(default_factory=threading.RLock)
+    #: Show in the other windows what this one has saved.
     share: Callable[[], None] = lambda: None
+    #: Frames that are moved here and that another window has saved at another pose.
     conflicts: set[str] = field(default_factory=set)
 
 

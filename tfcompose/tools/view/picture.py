@@ -24,20 +24,17 @@ _TURNING = frozenset({"revolute", "continuous"})
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Where everything is, in the roots of its trees, or in the fixed frame.
+    """The poses of all frames, in the roots of their trees or in the fixed frame."""
 
-    Attributes:
-        robot: the robot with the parents that were published.
-        poses: of each of its frames; what did not come is where the robot says.
-        further: the poses of frames that are not the robot's.
-        ghosts: where the robot has frames that are elsewhere, and all below them.
-        wrong: the edges, (parent, child), of which something is wrong.
-    """
-
+    #: The robot with the published parents.
     robot: Robot
+    #: Poses of the robot's frames. A frame that was not published is at its pose in the robot.
     poses: Mapping[str, Pose]
+    #: Poses of frames that are not the robot's.
     further: Mapping[str, Pose] = field(default_factory=dict)
+    #: Expected poses of frames that are elsewhere, and of all frames below them.
     ghosts: Mapping[str, Pose] = field(default_factory=dict)
+    #: Edges (parent, child) with a fault.
     wrong: tuple[tuple[str, str], ...] = ()
 
 

@@ -26,32 +26,31 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """The result of saving: the diff, findings, and poses that no edit can give.
-
-    Nothing is saved where ``refused`` findings are new errors.
-    """
+    """The result of saving."""
 
     diff: str = ""
     findings: tuple[Finding, ...] = ()
+    #: New errors because of which nothing was saved.
     refused: tuple[Finding, ...] = ()
+    #: Poses that no edit can set.
     elsewhere: tuple[Elsewhere, ...] = ()
 
 
 @dataclass(slots=True)
 class Session:
-    """A robot with moved mounts.
+    """A robot with moved mounts."""
 
-    ``texts`` are the files that may be edited, the robot's own one first.
-
-    ``compiled`` compiles texts that are not written yet, ``write`` replaces a file's old text by
-    the new one. ``known`` is what the texts compile to, if that is known.
-    """
-
+    #: The editable files, the robot's own one first.
     texts: Mapping[str, str]
+    #: Compile texts that are not written yet.
     compiled: Callable[[Mapping[str, str]], Compiled]
+    #: Replace a file's old text with the new one. Arguments: file, old text, new text.
     write: Callable[[str, str, str], None]
+    #: The result of compiling ``texts``, if it is available.
     known: InitVar[Compiled | None] = None
+    #: The compiled ``texts``.
     state: Compiled = field(init=False)
+    #: The new pose in its parent, by frame.
     moved: dict[str, Pose] = field(default_factory=dict)
     _undo: list[dict[str, Pose]] = field(default_factory=list)
     _redo: list[dict[str, Pose]] = field(default_factory=list)

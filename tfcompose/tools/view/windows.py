@@ -36,13 +36,11 @@ class SceneSource:
     """A source of a scene: frames are where the robot file and the sliders put them.
 
     A running tree and a recording override this.
-
-    Attributes:
-        has_edit: whether mounts can be moved and saved.
-        has_joints: whether a window has sliders of joints.
     """
 
+    #: Whether mounts can be moved and saved.
     has_edit: bool = False
+    #: Whether a window has joint sliders.
     has_joints: bool = True
 
     def show_in(self, shown: ReloadedPanel) -> None:

@@ -1,7 +1,5 @@
-"""From a robot file to what is built.
+"""Compilation of a robot file.
 
-Resolve the spec into a robot, check it, and emit URDF, plan and pictures.
-
-``compile`` shows the whole way. Must not import ``tf``, ``guard``, ``launcher``, ``cli``,
-``tools``, ``rclpy``.
+Resolve the spec into a robot, check it, and emit URDF, plan and pictures. ``compile`` has the
+whole sequence. Must not import ``tf``, ``guard``, ``launcher``, ``cli``, ``tools``, ``rclpy``.
 """

@@ -1,4 +1,4 @@
-"""The whole way from text to files, on one screen."""
+"""All steps from text to files, on one screen."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Compiled:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """The findings that stand in the way of a build."""
+        """The findings that prevent a build."""
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
@@ -62,9 +62,9 @@ def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
 ) -> Compiled:
     """Return the robot with profiles and overlays merged, and all findings by place.
 
-    ``read`` gives the text of a file that is included or holds a calibration; without it nothing
-    can be. ``disk`` says which files and packages there are; without it no mesh is looked for.
-    ``given`` are its arguments' values, and the environment, which is empty otherwise.
+    ``read`` returns the text of an included file or a calibration; without it no file can be read.
+    ``disk`` tells which files and packages exist; without it meshes are not looked up. ``given``
+    has the values of the robot's arguments and the environment, which is empty by default.
     """
     try:
         source = load(text, file)
@@ -83,7 +83,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     disk: Disk | None = None,
     given: Given = NOTHING,
 ) -> Compiled:
-    """Return what ``compile_robot`` does, from text that is loaded, with its includes."""
+    """Return the result of ``compile_robot`` for a text that is loaded, with its includes."""
     try:
         validated = validate(
             compose(source, profiles, overlays, given, read), profiles_in(source), given

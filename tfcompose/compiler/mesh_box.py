@@ -1,7 +1,7 @@
 """Bounding boxes of mesh files: STL, OBJ and COLLADA, read without a library.
 
-Rules want to know in which unit a file is. For that a sample of a large file is enough, and no
-robot should wait for numpy.
+Rules use them to detect the unit of a file. A sample of a large file is enough for that, and saves
+the time to import numpy.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _DEEPEST = 50
 def size_of(shape: Shape) -> Vector | None:
     """Return the lengths of the shape's bounding box along its axes, in metres.
 
-    None: a mesh whose file is not here, cannot be read, or has another format.
+    None: a mesh whose file is missing, cannot be read, or has another format.
     """
     match shape.kind:
         case "box":
@@ -69,7 +69,7 @@ def size_of(shape: Shape) -> Vector | None:
 def mesh_box(path: str) -> Corners | None:
     """Return the box around a mesh, in metres at a scale of 1.
 
-    None: the file cannot be read, has another format, or no vertices.
+    None: the file cannot be read, has another format, or has no vertices.
     """
     read = _READERS.get(path.rpartition(".")[2].lower())
     try:

@@ -20,8 +20,8 @@ _UNIT = re.compile(rb"""<unit\b[^>]*\bmeter\s*=\s*["']\s*([0-9.eE+-]+)""")
 def read_mesh(path: str, scale: Vector) -> Any:
     """Return the mesh of a file at a scale, a ``trimesh.Trimesh``.
 
-    A COLLADA file is in the unit that it declares, as RViz and Gazebo read it; its up_axis is
-    ignored, as they do.
+    A COLLADA file is in the unit that it declares, as in RViz and Gazebo. Like them, this ignores
+    up_axis.
 
     Raises:
         Exception: whatever a reader raises for a file that is no mesh.

@@ -1,4 +1,4 @@
-"""Provenance of an edge: the places of the values that it was made of."""
+"""Provenance of an edge: the places of the values that make it up."""
 
 from __future__ import annotations
 
@@ -29,11 +29,10 @@ _KEYS = (
 
 
 def values_of(edge: Edge, sources: Sequence[Source]) -> list[str]:
-    """Return a line for each value that the edge was made of.
+    """Return a line for each value that makes up the edge.
 
-    Key, value, place, and the places of what it replaced.
-
-    ``sources`` are the robot's own, and those of its parts.
+    Key, value, place, and the places of the values it replaced. ``sources`` are the robot's own
+    and those of its parts.
     """
     lines = []
     for source, path, value in _given_values(edge, sources):

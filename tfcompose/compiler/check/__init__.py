@@ -1,7 +1,7 @@
-"""Judges a ``Robot``: each rule is a function that yields the findings of one code.
+"""Rules over a ``Robot``: each rule is a function that yields the findings of one code.
 
-A module holds the rules of one family; what a code means is in the catalogue. ``check`` runs the
-rules and applies the comments that allow findings.
+A module holds the rules of one family. The catalogue explains the codes. ``check`` runs the rules
+and applies the comments that allow findings.
 """
 
 from tfcompose.compiler.check.check import (

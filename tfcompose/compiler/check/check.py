@@ -1,9 +1,9 @@
-"""Every rule over one robot, what silences findings, and notes about values that were replaced.
+"""Run every rule over a robot, silence findings, and add notes about replaced values.
 
-A rule that crashes is a finding, and the others go on. ``# tfcompose: allow TF301 because …``
-silences a finding on its line, or alone on the line above; ``rules`` sets a severity, or ``off``,
-for a whole robot. Findings about text and keys cannot be silenced, since they say that the file
-was not understood; nor can those that leave nothing to build.
+If a rule crashes, that is a finding, and the other rules still run. ``# tfcompose: allow TF301
+because …`` silences a finding on its line or, alone on a line, on the next one. ``rules`` sets a
+severity, or ``off``, for a whole robot. Findings about text and keys cannot be silenced, because
+the file was not understood; nor can findings that leave nothing to build.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _OF_VALUES = frozenset({"TF410", "TF411", "TF412", "TF704", "TF705", "TF707"})
 
 
 def by_code(rules: Iterable[Rule]) -> dict[str, Rule]:
-    """Return the rules by code, in the order of codes.
+    """Return the rules by code, sorted by code.
 
     Raises:
         ValueError: if two have one code.
@@ -85,11 +85,11 @@ RULES = by_code(
 
 
 def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]:
-    """Return what the rules find, in no particular order.
+    """Return the findings of all rules, in no particular order.
 
-    Left out is what merely follows from a value that was refused already, what only this variant
-    of the robot has no use for, and warnings about parts from a URDF: ``lint`` of their files
-    reports them.
+    Omitted are findings that only follow from a refused value, unused entries of a variant
+    (profiles or overlays merged), and warnings about parts from a URDF, which ``lint`` of their
+    files reports.
     """
     findings: list[Finding] = []
     for rule in rules:
@@ -173,12 +173,11 @@ def _of_part(finding: Finding, robot: Robot) -> Finding:
 def silence(
     findings: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
 ) -> tuple[list[Finding], Used]:
-    """Return the findings not silenced, and the comments that silenced something.
+    """Return the findings that are not silenced, and the comments that silenced one.
 
-    A comment or an entry of ``rules`` silences a finding.
-
-    ``rules`` holds for codes and names a severity, ``off``, or nothing, each with its place; an
-    entry that is neither a code nor a name, or cannot be set, is a finding too.
+    A comment or an entry of ``rules`` silences a finding. ``rules`` maps codes and names to a
+    severity or ``off``, each with its place. An entry that is neither a code nor a name, or cannot
+    be set, is a finding too.
     """
     unknown = _unknown_rules({name: span for name, (_, span) in rules.items()})
     return apply(
@@ -255,10 +254,7 @@ def _covers(allow: Allow, finding: Finding) -> bool:
 
 
 def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
-    """Return a finding for each comment that allows nothing or gives no reason.
-
-    Or that cannot allow what it names.
-    """
+    """Return a finding for each comment without effect, without a reason, or not permitted."""
     findings = []
     for allow in allows:
         if not allow.codes:
@@ -290,7 +286,7 @@ _OF_AN_ENTRY = 2  # its section and its name
 
 
 def add_replaced_notes(findings: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
-    """Return the findings, with notes about the values that theirs replaced."""
+    """Return the findings with notes about the values that their values replaced."""
     overlaid = [source for source in sources if source.replaced]
     if not overlaid:
         return list(findings)

@@ -57,7 +57,7 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
 
 
 def valid_name(name: str) -> str:
-    """Return the name with an underscore for what is not valid; empty if that does not do."""
+    """Return the name with underscores for invalid characters; empty if it is still invalid."""
     better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
     return better if _GOOD.fullmatch(better) else ""
 

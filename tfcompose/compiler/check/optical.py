@@ -1,4 +1,4 @@
-"""Rules about optical frames: that a camera has one, and that it is rotated as REP-103 has it."""
+"""Rules about optical frames: each camera has one, rotated as REP-103 requires."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Rules about where sensors are.
-
-What their own robot hides from them, and what they have to see.
-"""
+"""Rules about sensor placement: views that the robot blocks, and zones to cover."""
 
 from __future__ import annotations
 

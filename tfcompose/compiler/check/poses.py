@@ -1,6 +1,6 @@
-"""Rules about poses: units, conventions of REP-103, and values that look mistyped.
+"""Rules about poses: units, conventions of REP-103, and likely typing errors.
 
-And where frames are in the base.
+``poses_in_base`` returns the poses of frames in the base.
 """
 
 from __future__ import annotations
@@ -439,7 +439,7 @@ _MIRRORED_M = 0.001
 def poses_in_base(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
     """Return the pose in the robot's base of each frame fixed to it.
 
-    ``moving``: also through joints, at zero.
+    ``moving``: include frames behind joints, at position zero.
     """
     poses = {robot.base: Pose()} if robot.base else {}
     children = robot.children() if poses else {}
@@ -455,10 +455,7 @@ def poses_in_base(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
 
 
 def twins(frame: str) -> Iterator[str]:
-    """Yield the names that the frame has on the other side of the robot.
-
-    Left_wheel_link → right_wheel_link.
-    """
+    """Yield the possible names of the frame's mirror image: left_wheel_link → right_wheel_link."""
     tokens = frame.split("_")
     for index, token in enumerate(tokens):
         side, rest = _side_in(token)
@@ -476,13 +473,13 @@ def _side_in(token: str) -> tuple[str, str]:
 
 
 def without_side(frame: str) -> str:
-    """Return the name with a star for each side: left_wheel_link is ``*_wheel_link``."""
+    """Return the name with a star for each side: left_wheel_link → ``*_wheel_link``."""
     tokens = map(_side_in, frame.split("_"))
     return "_".join(f"{'*' * bool(side)}{rest}" for side, rest in tokens)
 
 
 def are_swapped(edge: Edge, other: Edge) -> bool:
-    """Return whether two frames stand mirrored to the sides in their names."""
+    """Return whether two frames are on the opposite sides of what their names say."""
     axis, sign = side_of(edge.child, other.child)
     here, there = edge.pose.xyz, other.pose.xyz
     mirrored = list(there)
@@ -500,7 +497,7 @@ def side_of(frame: str, twin: str) -> tuple[int, int]:
 
 
 def are_mirrored(edge: Edge, other: Edge) -> bool:
-    """Return whether two frames named after two sides stand at one place."""
+    """Return whether two frames named after two sides are at the same place."""
     if edge.parent != other.parent or other.child not in twins(edge.child):
         return False
     axis, _ = side_of(edge.child, other.child)
@@ -509,10 +506,10 @@ def are_mirrored(edge: Edge, other: Edge) -> bool:
 
 
 def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None:
-    """Return the least and greatest x, y, z in ``frame`` of the bodies that are fixed to it.
+    """Return the least and greatest x, y, z in ``frame`` of the bodies fixed to it, in metres.
 
-    Each shape counts with the sphere around it. ``without`` names a sensor whose bodies do not
-    count. None: there are no bodies, or one of them is a mesh that cannot be read.
+    Each shape counts with its bounding sphere. ``without`` names a sensor whose bodies are
+    ignored. None: there are no bodies, or one is an unreadable mesh.
     """
     inside = {edge.child for edge in robot.edges if edge.sensor == without} if without else set()
     least, most = [math.inf] * 3, [-math.inf] * 3
@@ -530,7 +527,7 @@ def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None
 
 
 def is_near(box: Box, xyz: Vector) -> bool:
-    """Return whether the point is in the box, or within reach of it."""
+    """Return whether the point is in the box or within ``reach`` of it."""
     return all(
         low - _REACH_M <= value <= high + _REACH_M
         for low, value, high in zip(box[0], xyz, box[1], strict=True)

@@ -1,6 +1,6 @@
 """Rules about frame prefixes.
 
-Nodes that look frames up need the names that frames have on the live tree.
+Nodes that look up frames need their names on the live tree.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Rules about processes: what they wait for, and what they are there for."""
+"""Rules about processes: conditions that they wait for, and processes without use."""
 
 from __future__ import annotations
 

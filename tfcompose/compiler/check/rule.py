@@ -1,6 +1,6 @@
 """Rules: functions that yield the findings of one code.
 
-What the code means is in the catalogue: ``tfcompose/data/codes/CODE.md``.
+``tfcompose/data/codes/CODE.md`` explains the code.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def rule(
 ) -> Callable[[Find], Rule]:
     """Return a decorator that makes a function the rule of a code.
 
-    The function has the name that the catalogue has for the code.
+    The function has the catalogue's name for the code.
     """
 
     def make_rule(find: Find) -> Rule:

@@ -1,6 +1,6 @@
-"""Rules about stock publishers of TF among a robot's processes.
+"""Rules about stock TF publishers among a robot's processes.
 
-What they publish is on their command lines.
+Their command lines tell which edges they publish.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Rules about wheels: their axes, the ground that they stand on, and what turns with them."""
+"""Rules about wheels: their axes, the ground under them, and the frames that turn with them."""
 
 from __future__ import annotations
 

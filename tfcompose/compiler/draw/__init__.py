@@ -1,6 +1,6 @@
-"""Draws a TF tree from a plain description of frames and edges: SVG, PNG, DOT and Mermaid.
+"""Drawings of a TF tree as SVG, PNG, DOT and Mermaid, from a plain description.
 
-Lengths are CSS's px of 1/96 inch.
+Lengths are CSS px (1/96 inch).
 """
 
 from tfcompose.compiler.draw.graph import Arrow, Graph, Group

@@ -1,9 +1,9 @@
 """Arrangement of a picture: to the right, down, or in columns.
 
-In columns the subtrees below the frame where the tree first branches stand side by side. The
-frames above it stay in a row on top, from where one line runs along the top of all columns, and
-down on the left of each, so that no edge crosses a box. Subtrees keep their shape and their order:
-down the first column, then the next.
+Columns place the subtrees below the first branching frame side by side. The frames above it form a
+row on top. From there one line runs along the top of all columns and down on the left of each, so
+that no edge crosses a box. Subtrees keep their shape and their order: down the first column, then
+the next.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FROM_LINE = 22.0  # from the line on the left of a column to its frames
 def arrange(graph: Graph, forest: Forest, direction: Direction = "auto") -> Layout:
     """Return the position of everything, from (0, 0).
 
-    ``auto`` goes to the right, unless it is too wide or too tall.
+    ``auto`` goes to the right unless the picture is too wide or too tall.
     """
     if direction == "down":
         return layout(graph, forest, is_down=True)
@@ -66,10 +66,10 @@ class _Block:
 
 
 def in_columns(forest: Forest, flat: Layout) -> Layout:
-    """Return the layout to the right, ``flat``, in as few columns as make it no taller than wide.
+    """Return the layout ``flat`` in the fewest columns that make it no taller than wide.
 
-    It stays as it is where there is more than one root, nothing branches, or a group begins above
-    the branches.
+    It is unchanged if there are several roots, nothing branches, or a group begins above the
+    branches.
     """
     stem = _stem(forest)
     children = forest.children[stem[-1]] if stem else []

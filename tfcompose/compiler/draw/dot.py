@@ -18,7 +18,7 @@ _LINES = {"static": "solid", "joint": "dashed", "dynamic": "dashed", "alternativ
 def dot(graph: Graph, *, is_down: bool = False) -> str:
     """Return the graph in the DOT language.
 
-    Frames by their names, groups as clusters, owners as colours.
+    Frames are nodes, groups are clusters, and owners have colours.
     """
     return "".join(f"{line}\n" for line in _lines(graph, "TB" if is_down else "LR"))
 

@@ -52,7 +52,7 @@ class Graph:
     hidden: tuple[Arrow, ...] = ()
 
     def all_frames(self) -> list[str]:
-        """Return every frame once: given ones, then those named only by edges and groups."""
+        """Return every frame once: ``frames``, then those that only edges and groups name."""
         ends = (end for arrow in self.arrows for end in (arrow.parent, arrow.child))
         return list(
             dict.fromkeys(
@@ -61,15 +61,12 @@ class Graph:
         )
 
     def all_owners(self) -> list[str]:
-        """Return every owner once: those that were given, then those that only edges name."""
+        """Return every owner once: ``owners``, then those that only edges name."""
         return list(dict.fromkeys((*self.owners, *(arrow.owner for arrow in self.arrows))))
 
 
 def collapse_groups(graph: Graph) -> Graph:
-    """Return the graph with each group as the frames that others need.
-
-    Where it begins, and what leads to others.
-    """
+    """Return the graph with each group reduced to its first frame and the frames above others."""
     up = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
     inside = {frame: group for group in graph.groups for frame in group.frames}
     first = {
@@ -127,7 +124,7 @@ class Forest:
     group: dict[str, int]
 
     def enters(self, frame: str) -> bool:
-        """Return whether the frame is where its group begins."""
+        """Return whether the frame is the first of its group."""
         group = self.group.get(frame)
         return group is not None and (
             frame not in self.up or self.group.get(self.up[frame].parent) != group
@@ -137,9 +134,8 @@ class Forest:
 def forest_of(graph: Graph) -> Forest:
     """Return the graph as trees.
 
-    A frame with several parents is below the first, and a cycle is broken once.
-
-    Children of the same group as their parent come first, so that a group stays together.
+    A frame with several parents is below the first, and each cycle is broken once. Children in the
+    same group as their parent come first, so that groups stay together.
     """
     group = {frame: index for index, group in enumerate(graph.groups) for frame in group.frames}
     frames = graph.all_frames()

@@ -1,14 +1,10 @@
 """The position of each frame.
 
-A tree from left to right, a row for each leaf, a parent in the middle of its children.
-
-Or, downwards, a row for each frame, below its parent and a little to its right: what is long, such
-as an arm, then fits a page. The rows of two subtrees that do not contain one another are apart,
-and a child begins to the right of its parent, or below it, so no two boxes overlap. The cost grows
-with the number of frames.
-
-A group's rectangle is drawn around its own frames, and around their descendants where those are in
-between.
+To the right: a row for each leaf, and each parent in the middle of its children. Down: a row for
+each frame, below its parent and a little to its right, so that a long chain, such as an arm, fits
+a page. Separate subtrees share no rows, and a child begins to the right of its parent, or below
+it, so no two boxes overlap. The cost grows linearly with the number of frames. A group's rectangle
+surrounds its own frames and any descendants between them.
 """
 
 from __future__ import annotations
@@ -41,9 +37,9 @@ PAD = 8.0  # between a text and its box, and between a group and its frames
 
 @dataclass(slots=True)
 class FrameBox:
-    """A frame's box: left edge, middle of its height, width and height, in px.
+    """A frame's box: left edge, middle of its height, width and height.
 
-    From the top left corner.
+    In px from the top left corner.
     """
 
     x: float
@@ -78,7 +74,7 @@ class Area:
 class Trunk:
     """The line from a frame to its children in columns.
 
-    Its y above them, and by child the x where it goes down.
+    Its y above them, and by child the x of the line down to it.
     """
 
     frame: str

@@ -1,4 +1,4 @@
-"""A graph as a Mermaid flowchart, which Markdown pages show."""
+"""A graph as a Mermaid flowchart, for Markdown pages."""
 
 from __future__ import annotations
 

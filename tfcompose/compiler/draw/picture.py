@@ -68,7 +68,7 @@ class Curve:
 
     @property
     def straight(self) -> bool:
-        """Whether it is a level line from left to right."""
+        """Whether it is a horizontal line from left to right."""
         return len({y for _, y in self.points}) == 1
 
 
@@ -108,7 +108,7 @@ def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
 
 @dataclass(slots=True)
 class TextLine:
-    """A line of text: start or middle of its base line, and the width it may take."""
+    """A line of text: start or middle of its baseline, and its maximum width."""
 
     x: float
     y: float
@@ -123,7 +123,7 @@ Shape = Union[Box, Curve, TextLine]  # noqa: UP007 (evaluated when it is loaded,
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """Shapes, from back to front, and the size of the paper."""
+    """Shapes from back to front, and the size of the page."""
 
     title: str
     width: float

@@ -1,6 +1,6 @@
 """A drawing as PNG: its SVG rendered by resvg, in Lato from the package ``font_lato``.
 
-The fonts of the system serve only characters that Lato lacks.
+System fonts are used only for characters that Lato lacks.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MOST_TO_A_SIDE = 32_000.0  # viewers count these in 15 bits
 
 
 def png(drawing: Drawing) -> bytes:
-    """Return the drawing as PNG with two pixels to a px, fewer for a very large one."""
+    """Return the drawing as PNG at two pixels per px, fewer for a very large one."""
     scale = min(
         PIXELS_PER_PX,
         (MOST_PIXELS / (drawing.width * drawing.height)) ** 0.5,

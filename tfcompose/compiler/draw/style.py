@@ -1,8 +1,8 @@
 """Colours, lines and fonts in one table, and widths of text.
 
-The colours of owners are those of Okabe and Ito, which people with any kind of colour blindness
-tell apart; each owner has a number as well, for print without colour and for robots with more
-owners than colours.
+The owners' colours are those of Okabe and Ito, which people with any kind of colour blindness can
+tell apart. Each owner also has a number, for print without colour and for robots with more owners
+than colours.
 """
 
 from __future__ import annotations
@@ -18,7 +18,10 @@ SANS = "Arial, Helvetica, 'Liberation Sans', sans-serif"
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """Colours as six hexadecimal digits, in light and dark mode; empty: none. Lengths in px."""
+    """Colours as six hexadecimal digits, in light and dark mode; empty: none.
+
+    Lengths in px.
+    """
 
     fill: tuple[str, str] = ("", "")
     stroke: tuple[str, str] = ("", "")
@@ -51,7 +54,7 @@ _OWNERS = (
 def colour_of(owner: int) -> int:
     """Return the number of the owner's colour, from 0.
 
-    The first has grey to itself, the others share the rest.
+    The first owner alone has grey. The others share the rest.
     """
     return 1 + (owner - 1) % (len(_OWNERS) - 1) if owner else 0
 
@@ -192,7 +195,7 @@ _MAX_CHARACTERS = 72
 
 @lru_cache(maxsize=1 << 14)
 def width_of(text: str, size: float, *, bold: bool = False) -> float:
-    """Return how wide the text is, in the unit of ``size``, to a tenth.
+    """Return the width of the text, in the unit of ``size``, to a tenth.
 
     Characters beyond ASCII count as wide as they are high.
     """
@@ -201,9 +204,9 @@ def width_of(text: str, size: float, *, bold: bool = False) -> float:
 
 
 def shorten_label(text: str) -> str:
-    """Return the text as it is drawn.
+    """Return the text as drawn.
 
-    Invisible characters as escapes, and of a long one its beginning and end.
+    Invisible characters become escapes, and a long text keeps its beginning and end.
     """
     text = visible(text)
     if len(text) <= _MAX_CHARACTERS:

@@ -20,7 +20,7 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 def svg(drawing: Drawing) -> str:
     """Return the drawing as SVG; the same drawing gives the same text.
 
-    Each edge is a path with a title, which browsers show at the pointer.
+    Each edge is a path with a title, which browsers show as a tooltip.
     """
     width, height = f"{drawing.width:g}", f"{drawing.height:g}"
     title = _text(drawing.title)

@@ -1,8 +1,6 @@
-"""Turns a ``Robot`` without errors into files, as text.
+"""Files, as text, from a ``Robot`` without errors.
 
-Plan.json, URDF, xacro, parameters and pictures.
-
-The same robot gives the same bytes.
+plan.json, URDF, xacro, parameters and pictures. The same robot gives the same bytes.
 """
 
 from tfcompose.compiler.emit.emit import descriptions_of, emit

@@ -1,4 +1,4 @@
-"""Command lines of processes with the ROS arguments of nodes, and parameter files."""
+"""Command lines of processes, with ROS arguments of nodes, and parameter files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PARAMS_FILE = "${params_file}"
 def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> tuple[str, ...]:
     """Return the process's command.
 
-    ``owns`` says that it has edges, ``has_params`` that a file of parameters is written for it.
+    ``owns``: the process owns edges. ``has_params``: a parameter file is written for it.
     """
     if process.kind in {"external", "component"}:
         return ()
@@ -113,11 +113,11 @@ _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
 def file_params(process: Process) -> dict[str, dict[str, Any]]:
-    """Return what the process's parameter file holds, by node.
+    """Return the contents of the process's parameter file, by node.
 
-    First what the files that it names say to others, as every node of a process reads the file;
-    its own come last, which takes precedence. All but the paths that only the launcher knows: a
-    section that means one of its nodes would count before what the command line says of them.
+    Sections for other nodes in the files that it names come first, because every node of a process
+    reads the file. Its own parameters come last, so that they take precedence. Paths that only the
+    launcher knows are omitted: a section for one of its nodes would override the command line.
     """
     if process.kind != "run":
         return {}
@@ -144,7 +144,7 @@ def _without(params: dict[str, Any], names: Collection[str], above: str = "") ->
 
 
 def component_params(process: Process, robot: Robot) -> dict[str, Any]:
-    """Return the parameters of a component, by their full names, as values that ROS has."""
+    """Return the parameters of a component by full name, as ROS values."""
     clock = {"use_sim_time": True} if robot.ros.clock == "sim" else {}
     params = process.ros_nodes[0].flat_texts
     return clock | {name: json_value(_read_as_ros(value)) for name, value in params.items()}
@@ -173,7 +173,10 @@ def _known_params(params: dict[str, Any]) -> dict[str, Any]:
 
 
 def params_file(nodes: dict[str, dict[str, Any]]) -> str:
-    """Return the file's text. Texts are quoted, so that ROS takes none for a number."""
+    """Return the file's text.
+
+    Strings are quoted, so that ROS reads none as a number.
+    """
     lines = []
     for node, params in nodes.items():
         lines += [f"{_text(node)}:", "  ros__parameters:", *_mapping(params, "    ")]

@@ -1,4 +1,4 @@
-"""From a right robot to its files, as text."""
+"""Files, as text, of a robot without errors."""
 
 from __future__ import annotations
 
@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
     """Return the robot's files; the same robot gives the same bytes.
 
-    There must be no errors in it.
-
-    ``target`` says where they are written and how they address meshes.
+    The robot must have no errors. ``target`` says where the files are written and how they address
+    meshes.
     """
     live = robot.with_final_names()
     descriptions = {}
@@ -48,10 +47,7 @@ def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
 
 
 def descriptions_of(robot: Robot) -> list[tuple[str, Robot]]:
-    """Return what has a description of its own.
-
-    The robot, and each part that is a robot, by its name.
-    """
+    """Return the robot, and by name each part that is a robot: each has a description."""
     return [("", robot), *((part.name, part.robot) for part in robot.parts)]
 
 

@@ -1,4 +1,4 @@
-"""The plan: what the robot's processes are started with, and which edges each of them owns."""
+"""The plan: the start of each process, and the edges it owns."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ORDER = {"static": 0, "joints": 1, "guard": 3}
 
 
 def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
-    """Return the plan of a right robot; ``target`` says where it will be written."""
+    """Return the plan of a robot without errors; ``target`` says where it will be written."""
     nodes = {process.name: process.node for process in robot.processes}
     needed = _needed_processes(robot)
     names = frozenset(process.name for process in needed)
@@ -198,12 +198,12 @@ def _on(main: str | None, process: PlanProcess) -> PlanProcess:
 
 
 def driven_sensors(process: Process, robot: Robot) -> tuple[Driven, ...]:
-    """Return the sensors that the process drives and whose driver publishes by default."""
+    """Return the sensors of the process whose driver publishes frames by default."""
     return tuple(_driven_sensor(sensor, robot) for sensor in _sensors(process, robot))
 
 
 def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
-    """Return, by node, the parameters that are written for it and decide what it publishes."""
+    """Return, by node, the written parameters that decide which edges it publishes."""
     keys = {key for sensor in _sensors(process, robot) for key in _switch(sensor)}
     found = {}
     for node in process.ros_nodes if process.kind in {"run", "external", "component"} else ():

@@ -1,7 +1,7 @@
-"""Rays from the frame of a sensor's stream, and the bodies of the robot that they hit.
+"""Rays from the frame of a sensor's stream, and the robot's bodies that they hit.
 
-Pure functions of a ``Robot``; boxes, cylinders, spheres and capsules need no library, and meshes
-are hit where trimesh is installed.
+Pure functions of a ``Robot``. Boxes, cylinders, spheres and capsules need no library; meshes need
+trimesh.
 """
 
 from tfcompose.compiler.rays.bodies import PosedShape, Surroundings, sphere_around

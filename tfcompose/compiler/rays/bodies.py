@@ -63,11 +63,10 @@ class _Group:
 
 
 class Surroundings:
-    """What stands still around each frame of a robot, up and down the tree, and the bodies there.
+    """Frames and bodies that do not move relative to a frame of the robot.
 
-    ``only_static`` keeps to static edges. Otherwise those inside a sensor count too, whoever
-    publishes them, and what a continuous joint turns with its pose at zero, if it is below: a
-    wheel turns on the spot.
+    ``only_static`` follows static edges only. Otherwise a sensor's inner edges count too, whoever
+    publishes them, and, downwards, continuous joints at zero: a wheel turns on the spot.
     """
 
     def __init__(self, robot: Robot, *, only_static: bool = False) -> None:
@@ -98,13 +97,13 @@ class Surroundings:
         return self._groups[frame]
 
     def poses(self, frame: str) -> dict[str, Pose]:
-        """Return the pose in ``frame`` of each frame that stands still there."""
+        """Return the pose in ``frame`` of each frame fixed relative to it."""
         group = self._group(frame)
         to_frame = group.poses[frame].inverse()
         return {name: to_frame @ pose for name, pose in group.poses.items()}
 
     def pose(self, frame: str, other: str) -> Pose | None:
-        """Return the pose of ``other`` in ``frame``, None if it does not stand still there."""
+        """Return the pose of ``other`` in ``frame``, None if it moves relative to it."""
         poses = self._group(frame).poses
         return poses[frame].inverse() @ poses[other] if other in poses else None
 
@@ -118,8 +117,8 @@ class Surroundings:
     ) -> Iterator[PosedShape]:
         """Yield, in ``frame``, the shapes that rays from there may meet within ``reach`` metres.
 
-        ``into`` are the rays' directions. Shapes of the sensor itself and of links ``without``
-        are left out. A link in whose origin the sensor stands is its housing.
+        ``into`` are the rays' directions. Shapes of the sensor itself and of links ``without`` are
+        left out. A link whose origin is the sensor's is its housing.
         """
         own = {sensor.mount, *sensor.frames, *without}
         above = self._above.get(sensor.mount)
@@ -151,7 +150,7 @@ def _reach_frames(neighbours: Neighbours, poses: dict[str, Pose]) -> dict[str, P
 
 
 def sphere_around(shape: Shape) -> tuple[Vector, float] | None:
-    """Return the centre, in the shape's frame, and radius of its bounding sphere, in m.
+    """Return the centre, in the shape's frame, and radius of its bounding sphere, in metres.
 
     None: a mesh that cannot be read, because trimesh is not installed or the file is no mesh.
     """

@@ -1,4 +1,4 @@
-"""Rays in bundles, each with the cone around it, so that a body meets few of them."""
+"""Rays in bundles, each with the cone around it, to test few rays against each body."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class Bundle:
     parts: tuple[Bundle, ...] = ()
 
     def rotate(self, quat_xyzw: Quaternion) -> Bundle:
-        """Return the cone in the frame in which the rays' frame has this orientation."""
+        """Return the cone in another frame, given the orientation there of the rays' frame."""
         return replace(self, axis=rotate(quat_xyzw, self.axis), rays=(), parts=())
 
     def may_meet(self, x: float, y: float, z: float, radius: float) -> bool:
-        """Return whether the cone meets the sphere around the point; metres."""
+        """Return whether the cone meets the sphere around the point; in metres."""
         ax, ay, az = self.axis
         along = ax * x + ay * y + az * z
         aside = math.sqrt(max(0.0, x * x + y * y + z * z - along * along))
@@ -62,7 +62,7 @@ class Bundle:
 
 @lru_cache(maxsize=32)
 def bundle_of(into: tuple[Vector, ...]) -> Bundle:
-    """Return the bundle of the rays into these directions, unit vectors."""
+    """Return the bundle of the rays in these directions, which are unit vectors."""
     return _bundle(list(enumerate(into)))
 
 

@@ -27,9 +27,9 @@ _FAR_M = 1e3
 
 @dataclass(frozen=True, slots=True)
 class Ray:
-    """A ray in the stream's frame: a unit vector, and the metres to the first body, a link.
+    """A ray in the stream's frame: unit vector, metres to the first body, and its link.
 
-    Endless if it is free.
+    Infinite distance if nothing blocks it.
     """
 
     direction: Vector
@@ -63,20 +63,20 @@ class View:
 
     @property
     def blocked(self) -> float:
-        """The part of the rays that a body blocks, from 0 to 1."""
+        """The fraction of the rays that a body blocks, from 0 to 1."""
         return len(self.hits) / len(self.directions) if self.directions else 0.0
 
     @property
     def blocking(self) -> tuple[str, ...]:
-        """The links that block rays, the one that blocks most first."""
+        """The links that block rays, in descending order of blocked rays."""
         counts = Counter(link for _, link in self.hits.values())
         return tuple(sorted(counts, key=lambda link: (-counts[link], link)))
 
 
 def view_of(around: Surroundings, sensor: MountedSensor, optics: Optics) -> View:
-    """Return what one stream of the sensor sees of the bodies that are fixed to it.
+    """Return the view of one stream of the sensor against the bodies fixed to it.
 
-    No rays if its field of view is not known, and only what its origin is inside.
+    If its field of view is unknown there are no rays, only the links around its origin.
     """
     into = directions(optics)
     reach = reach_of(optics) if into else 0.0
@@ -85,14 +85,14 @@ def view_of(around: Surroundings, sensor: MountedSensor, optics: Optics) -> View
 
 
 def reach_of(optics: Optics) -> float:
-    """Return how far bodies are looked for, in metres."""
+    """Return the distance in metres up to which bodies are considered."""
     return min(optics.far or _FAR_M, _FAR_M)
 
 
 def cast(
     sensor: str, optics: Optics, into: tuple[Vector, ...], bodies: Iterable[PosedShape]
 ) -> View:
-    """Return the rays into these directions, unit vectors in the frame in which the bodies are."""
+    """Return the rays in these directions, unit vectors in the bodies' frame."""
     reach, bundle = reach_of(optics), bundle_of(into)
     nearest: dict[int, tuple[float, int, str]] = {}
     inside: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""The directions in which a stream looks, and whether it looks at a point."""
+"""The viewing directions of a stream, and a test of points against its field of view."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FLAT_RAD = 1e-6
 
 
 def different_streams(sensor: MountedSensor) -> Iterator[Optics]:
-    """Yield the sensor's streams; of those that see the same from the same frame, the first."""
+    """Yield the sensor's streams without those that repeat an earlier one's frame and view."""
     known = set()
     for stream in sensor.optics:
         sight = (
@@ -50,11 +50,10 @@ def is_plane(optics: Optics) -> bool:
 
 
 def directions(optics: Optics) -> tuple[Vector, ...]:
-    """Return unit vectors in the stream's frame, spread evenly over its image or its sector.
+    """Return unit vectors in the stream's frame, evenly spread over its image or sector.
 
-    None if that is unknown.
-
-    A plane is sampled a degree apart and in order, from its first angle to its last.
+    None if the field of view is unknown. A plane is sampled every degree, in order, from its first
+    angle to its last.
     """
     return _directions(replace(optics, stream="", frame="", span=_NOWHERE, sources=()))
 

@@ -55,7 +55,7 @@ def sphere_around(path: str, scale: Vector) -> tuple[Vector, float]:
 def depth_in(path: str, scale: Vector, point: Vector) -> float:
     """Return how deep the point is in the mesh, in metres.
 
-    Negative outside, and in a mesh that is not closed.
+    Negative outside, and for a mesh that is not closed.
 
     Raises:
         Exception: any error of trimesh's reader, if the file is not a mesh.

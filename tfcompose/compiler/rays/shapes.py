@@ -1,4 +1,4 @@
-"""Rays against primitives in their own frames (URDF: centred, cylinders along z)."""
+"""Intersections of rays with primitives in their frames (URDF: centred, cylinders along z)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _TINY = 1e-12
 
 
 def depth_in(shape: Shape, point: Vector) -> float:
-    """Return how deep the point, in the shape's frame, is in it, in metres; negative outside.
+    """Return the depth of the point, in the shape's frame, in metres; negative outside.
 
     Not for meshes.
     """
@@ -30,7 +30,7 @@ def depth_in(shape: Shape, point: Vector) -> float:
 
 
 def distance(shape: Shape, origin: Vector, direction: Vector) -> float:
-    """Return how far along the ray the shape begins, from outside; endless if it is missed.
+    """Return the distance along the ray to the shape, from outside; infinite for a miss.
 
     Not for meshes.
     """

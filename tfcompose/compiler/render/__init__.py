@@ -1,4 +1,1 @@
-"""Makes text of what commands print.
-
-Findings for people and programs, a robot's tree, and poses.
-"""
+"""Text output of commands: findings for people and programs, trees, and poses."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def render_json(findings: Sequence[Finding]) -> str:
-    """Return the findings as a JSON list; a place that is not known is null."""
+    """Return the findings as a JSON list; an unknown place is null."""
     return (
         json.dumps([_entry(finding) for finding in findings], indent=2, ensure_ascii=False) + "\n"
     )
@@ -82,7 +82,7 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 def render_sarif(findings: Sequence[Finding], version: str) -> str:
-    """Return the findings as one run of tfcompose, with the page of each code."""
+    """Return the findings as one SARIF run, with the page of each code."""
     codes = sorted({finding.code for finding in findings})
     run = {
         "tool": {
@@ -169,9 +169,7 @@ def render_junit(
 ) -> str:
     """Return a test suite of cases (group, name, findings).
 
-    One fails if a finding has a ``failing`` severity.
-
-    The other findings are in its output.
+    A case fails if a finding has a ``failing`` severity. Its other findings are in its output.
     """
     rows, failed, count = [], 0, 0
     for group, name, findings in cases:

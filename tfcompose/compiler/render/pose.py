@@ -13,9 +13,8 @@ if TYPE_CHECKING:
 def pose_text(parent: str, child: str, pose: Pose, when: str = "", decimals: int = 4) -> str:
     """Return the pose of ``child`` in ``parent``.
 
-    Metres, quaternion x y z w, fixed-axis angles in both units.
-
-    Degrees have two decimals fewer.
+    Metres, quaternion x y z w, and fixed-axis angles in radians and degrees. Degrees have two
+    decimals fewer.
     """
     degrees = tuple(math.degrees(angle) for angle in pose.rpy)
     return (

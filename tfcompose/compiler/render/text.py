@@ -31,7 +31,7 @@ CodeAddress = Callable[[str], str]
 
 
 def no_address(code: str) -> str:
-    """Return no address for any code."""
+    """Return no address, for any code."""
     del code
     return ""
 
@@ -45,8 +45,8 @@ def render_text(
 ) -> str:
     """Return the findings as text.
 
-    ``line_of`` returns a line of a file (from 1), or None if it cannot be read. A code with an
-    address is a link to it (OSC 8).
+    ``line_of`` returns a line of a file (from 1), or None if it cannot be read. A code that has an
+    address becomes a link (OSC 8).
     """
     paint = _Paint(address_of, colour=colour)
     return "".join(_format_finding(finding, line_of, paint) for finding in findings)
@@ -113,7 +113,7 @@ def _excerpt(
 
 
 def summary(findings: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
-    """Return the last line: counts of findings and files, and why warnings exit 0."""
+    """Return the last line: counts of findings and files, and why warnings exit with 0."""
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = len(findings) - errors
     where = f"in {plural(files, 'file')}"

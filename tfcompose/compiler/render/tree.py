@@ -1,6 +1,6 @@
-"""A robot's tree as text, and as a graph to be drawn.
+"""A robot's tree as text, and as a graph for drawing.
 
-Frames, and at each edge its kind, owner, rate and pose.
+Each edge has its kind, owner, rate and pose.
 """
 
 from __future__ import annotations
@@ -25,13 +25,11 @@ GAP = "  "
 
 
 def tree(robot: Robot, columns: int | None = None) -> str:
-    """Return the tree, one frame a line: kind, owner, rate.
+    """Return the tree, one frame per line: kind, owner, rate.
 
-    Position in metres and rpy in degrees where not zero.
-
-    Where that is wider than ``columns``, the facts follow each name at once, without the kinds
-    that owners imply; then without ``static`` where somebody else is the owner; and at last they
-    go on in the next line.
+    Position in metres and rpy in degrees, unless zero. If a line is wider than ``columns``, facts
+    directly follow the names and kinds implied by owners are omitted; then ``static`` is omitted
+    where another process is the owner; finally facts continue on the next line.
     """
     children = robot.children()
     rows = [
@@ -85,8 +83,8 @@ def _fit_rows(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> lis
 def wrap_rows(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> list[list[str]]:
     """Return each row of a drawing as lines of at most this many columns.
 
-    A row is the lines that lead to a name, the name, and facts; those for which there is no room
-    follow below. Where names have no room either, a level takes two columns.
+    A row is the tree lines, the name, and facts. Facts that do not fit continue below. If names do
+    not fit either, a level takes two columns.
     """
     if _widest(lines + name for lines, name, _ in rows) > columns:
         rows = [(_narrow(lines), name, facts) for lines, name, facts in rows]
@@ -134,12 +132,12 @@ def _rate(edge: Edge) -> str:
 
 
 def pose_text(edge: Edge) -> str:
-    """Return the edge's pose as ``short_pose`` has it, or that only its owner knows it."""
+    """Return the edge's pose as in ``short_pose``, or a note that only its owner knows it."""
     return short_pose(edge.pose) if edge.pose_known else "pose unknown"
 
 
 def edge_facts(edge: Edge) -> str:
-    """Return kind, owner, rate and pose of an edge, in one line."""
+    """Return kind, owner, rate and pose of an edge on one line."""
     facts = (edge.kind, f"by {edge.owner}", _rate(edge), pose_text(edge), _switch_of(edge))
     return GAP.join(fact for fact in facts if fact)
 
@@ -149,7 +147,7 @@ def _switch_of(edge: Edge) -> str:
 
 
 def short_pose(pose: Pose) -> str:
-    """Return position in metres and rotation (rpy) in degrees, as far as they are not zero."""
+    """Return position in metres and rotation (rpy) in degrees, without zero ones."""
     parts = []
     xyz = clean_xyz(pose.xyz)
     if any(xyz):
@@ -161,9 +159,9 @@ def short_pose(pose: Pose) -> str:
 
 
 def graph_of(robot: Robot, *, poses: bool = False) -> Graph:
-    """Return the tree of a robot with final names.
+    """Return the tree of a robot with its final names.
 
-    Sensors are groups, owners are in the order of the tree.
+    Sensors are groups. Owners are in tree order.
     """
     presets = {sensor.name: sensor.preset for sensor in robot.sensors}
     groups: dict[str, list[str]] = {}

@@ -1,8 +1,7 @@
-"""Turns a ``RobotSpec`` into a ``Robot``.
+"""Resolution of a ``RobotSpec`` into a ``Robot``.
 
-Presets expanded, parts included, poses solved, owners given.
-
-What cannot be resolved is a finding, and the robot goes on without it.
+Expand presets, include parts, solve poses, assign owners. Anything that cannot be resolved is a
+finding, and the robot continues without it.
 """
 
 from tfcompose.compiler.resolve.presets import Library

@@ -1,6 +1,4 @@
-"""``ros2_control`` and ``xml``.
-
-What a URDF holds next to links and joints, checked against the robot.
+"""``ros2_control`` and ``xml``: URDF elements besides links and joints, checked against the robot.
 
 The places of a raw block are lines of the robot file.
 """
@@ -42,7 +40,7 @@ class _NamesOrExcused(Collection[str]):
 
 
 def take_blocks(draft: Draft) -> Iterator[Finding]:
-    """Take the hardware and the raw blocks of the file, before those of parts."""
+    """Take the hardware and the raw blocks of the file. Parts add theirs after it."""
     robot, spec = draft.robot, draft.spec
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
     hardware = tuple(

@@ -1,4 +1,4 @@
-"""Bodies: shapes, colours, the files of meshes, and the inertia that follows from shapes."""
+"""Bodies: shapes, colours, mesh files, and the inertia derived from shapes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Bodies:
     )
 
     def link(self, name: str, body: specs.LinkSpec) -> Link:
-        """Return the link with its shapes and, where it has a mass, its inertia."""
+        """Return the link with its shapes and, if it has a mass, its inertia."""
         span = self.spec.key_span(("links", name))
         if (
             id(body) not in self._known
@@ -156,7 +156,7 @@ class Bodies:
     def moments(self, shapes: tuple[Shape, ...], span: Span) -> Moments | None:
         """Return the moments of the shapes at density 1 in the link's axes, None if unknown.
 
-        The reason is then a finding.
+        If they are unknown, the reason is a finding.
         """
         parts: list[Moments] = []
         for shape in shapes:
@@ -190,7 +190,7 @@ class Bodies:
 def with_colours(links: dict[str, Link]) -> dict[str, Link]:
     """Return the links with plain material names given the colour of their first use.
 
-    Where no other has one, it may be the name of a colour.
+    A name without a colour elsewhere may be the name of a colour.
     """
     known: dict[str, Material] = {}
     for material in materials(links):

@@ -1,9 +1,9 @@
-"""Measured poses from calibration files: which entry of which file is which edge's.
+"""Measured poses from calibration files, matched with edges.
 
-An entry is the pose of its child in its parent. Where the child is a frame inside a sensor, or the
-parent another frame than the edge's, the edge is solved for, as with ``place`` and
-``relative_to``. Files are read with the reader that is handed in; what is wrong with them is said
-at the place in the robot file, with a note into the calibration file.
+An entry is the pose of its child in its parent. If the child is a sensor's inner frame, or the
+parent is not the edge's, the edge is solved for, as with ``place`` and ``relative_to``. The given
+reader reads the files. A fault in one is reported at the place in the robot file, with a note into
+the calibration file.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _DEFAULT_LIMIT = CalibrationLimit()
 
 
 def measure(draft: Draft) -> Iterator[Finding]:
-    """Give mounts the poses of calibrations, which ``solve_poses`` makes those of their edges."""
+    """Give mounts the poses of calibrations. ``solve_poses`` makes them those of the edges."""
     work = _Calibrations(draft, _Files(draft.read))
     for edge in draft.edges:
         if group := group_of(edge):

@@ -1,9 +1,8 @@
-"""Settlement of claims: the edges that a node publishes by itself.
+"""Settlement of claims: edges that a node publishes by default.
 
-They are switched off where another process owns them, and get the names of the robot's frames.
-
-A claim that cannot be settled by parameters of a process that tfcompose starts is a finding, with
-the exact switch.
+A claim is switched off if another process owns the edge, and otherwise gets the names of the
+robot's frames. A claim that cannot be settled by parameters of a process that tfcompose starts is
+a finding with the exact switch.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def settle_claims(draft: Draft) -> Iterator[Finding]:
-    """Settle claims by parameters, and yield those that cannot be settled."""
+    """Settle claims by parameters, and yield findings about the rest."""
     robot = draft.robot
     if not any(
         declared.nodes or declared.publishes or preset_of(declared.node)
@@ -349,7 +348,7 @@ class _Claims:
 class Claimant:
     """One node that may publish TF.
 
-    What is known of it, the parameters a user gave it, and those tfcompose adds.
+    Known facts about it, the parameters a user gave it, and those tfcompose adds.
     """
 
     process: Process
@@ -362,12 +361,12 @@ class Claimant:
     contradicting: set[str] = field(default_factory=set)
 
     def settle(self) -> Node:
-        """Return the node with the parameters that tfcompose adds, where they reach it."""
+        """Return the node with the parameters that tfcompose adds, if they reach it."""
         node = replace(self.node, contradicting=frozenset(self.contradicting))
         return replace(node, params=node.params | self.computed) if self.takes_parameters else node
 
     def ends(self, claim: ClaimSpec) -> tuple[str, str]:
-        """Return the frames that the claim is about, parent and child."""
+        """Return the parent and child frames of the claim."""
         return self.roles.fill(claim.parent), self.roles.fill(claim.child)
 
     def has(self, params: dict[str, Any]) -> bool:
@@ -375,14 +374,14 @@ class Claimant:
         return bool(params) and all(self.given.get(key) == value for key, value in params.items())
 
     def is_published(self, claim: ClaimSpec) -> bool:
-        """Return whether the node publishes the edge as the user has set it."""
+        """Return whether the node publishes the edge with the user's parameters."""
         return (claim.by_default or self.has(claim.on)) and not self.has(claim.off)
 
     @property
     def takes_parameters(self) -> bool:
         """Return whether parameters that tfcompose writes reach the node.
 
-        Launch files and shells have to pass them.
+        Launch files and shells have to pass them on.
         """
         process = self.process
         if process.kind != "run":
@@ -400,9 +399,9 @@ _HOLE = re.compile(r"\{(\w+)\}")
 class Roles:
     """A node's frames by role.
 
-    First come the ends of the edges that its process owns; then frames with the names that the
-    node expects; for the base what hangs on its odom, else the robot's base. What is nowhere in
-    the tree has the node's own name for it.
+    In order: the ends of the edges that its process owns; frames with the names that the node
+    expects; for the base, the child of its odom frame, else the robot's base. A role without a
+    frame in the tree keeps the node's own name for it.
     """
 
     def __init__(
@@ -429,17 +428,17 @@ class Roles:
                 self.frames[role] = frame
 
     def is_bound(self, role: str) -> bool:
-        """Return whether the role follows from an edge that the process owns."""
+        """Return whether an edge that the process owns determines the role."""
         return role in self._bound
 
     def fill(self, template: str) -> str:
-        """Return a name with roles in it as a name of the tree."""
+        """Return a name with its roles replaced by names of the tree."""
         return _HOLE.sub(
             lambda hole: self.frames.get(hole[1], self._usual.get(hole[1], hole[0])), template
         )
 
     def final(self, value: Any) -> Any:
-        """Return a parameter's value; a role in it is the frame's name on the live tree."""
+        """Return a parameter's value, with the frame's name on the live tree for a role."""
         hole = _HOLE.fullmatch(value) if isinstance(value, str) else None
         if hole is None:
             return value

@@ -1,6 +1,4 @@
-"""Containers and the components in them.
-
-Programs of rclcpp_components, and the nodes that they load.
+"""Containers: programs of rclcpp_components, and the components that they load.
 
 Facts of rclcpp_components (ROS 2 Jazzy): ``component_container`` has one executor with one thread
 for all components, ``component_container_mt`` one with several threads;
@@ -40,7 +38,7 @@ PROGRAMS = {
 
 
 def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Process:
-    """Return the process of a container; it is ready when it can load."""
+    """Return the process of a container; it is ready when it can load components."""
     path: Path = ("containers", name)
     namespace = namespace_of(declared, spec.ros.namespace)
     node = Node(
@@ -66,7 +64,7 @@ def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Pr
 def component_process(process: Process, declared: StartedSpec, spec: RobotSpec) -> Process:
     """Return the process as a component of the container that it names.
 
-    It runs where, and is as needed as, that is.
+    It runs on the container's host and shares its ``required`` flag.
     """
     package, _, plugin = (declared.component or "").partition("/")
     loaded: dict[str, StartCondition] = {declared.container or "": "ready"}
@@ -84,7 +82,7 @@ def component_process(process: Process, declared: StartedSpec, spec: RobotSpec) 
 
 
 def check_components(draft: Draft) -> Iterator[Finding]:
-    """Yield what is wrong with components: no such container, and what they cannot have."""
+    """Yield findings about components: a missing container, and keys they cannot have."""
     for process in draft.robot.processes[: len(draft.processes)]:  # without those of parts
         if process.component:
             yield from _check_component(process, process.component, draft)

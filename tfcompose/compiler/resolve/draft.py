@@ -1,8 +1,7 @@
-"""A robot while it is resolved: what the file says, and what the passes made of it so far.
+"""A robot during resolution: the file's contents, and the results of the passes so far.
 
-A pass is a function of one draft that yields findings: it reads what the passes before it left,
-and fills in its own. A helper that finds something and returns a value besides does both as well:
-``value = yield from helper(…)``.
+A pass is a function of one draft that yields findings. It reads the results of earlier passes and
+fills in its own. A helper that also returns a value does both: ``value = yield from helper(…)``.
 """
 
 from __future__ import annotations
@@ -87,12 +86,12 @@ class Draft:
 
     @property
     def spec(self) -> RobotSpec:
-        """What the user wrote, with the places of it."""
+        """The user's file, with the places of its values."""
         return self.validated.spec
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The robot file, after those that it is a part of."""
+        """The files of the robots that include this one, outermost first, then its own."""
         above = self.holder.files if self.holder else ()
         return (*above, self.spec.spans.file)
 

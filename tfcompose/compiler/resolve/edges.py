@@ -1,8 +1,7 @@
-"""Edges as the user gave them: frames, links with a parent, joints and parts; each with its owner.
+"""Edges as the user gave them: frames, links with a parent, joints and parts, with owners.
 
-The numbers of poses and limits are kept as they were written too: a pose keeps a unit quaternion,
-and forgets whether 90, 1.57 or 90 deg was written. The rules about units and slips of the pen need
-to know.
+Poses and limits also keep their numbers as written, because rules about units and typing errors
+need them: a pose keeps a unit quaternion, which does not tell 90, 1.57 and 90 deg apart.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def add_frames(draft: Draft) -> Iterator[Finding]:
-    """Take the bare frames; one without a parent is a root, said so."""
+    """Take the bare frames; one without a parent is declared a root."""
     for name, frame in draft.spec.frames.items():
         path = ("frames", name)
         draft.frames.setdefault(name, draft.spec.key_span(path))
@@ -74,9 +73,9 @@ def add_edge(  # noqa: PLR0913 (an edge has that many parts)
     sensor: str | None = None,
     owner: str | None = None,
 ) -> Iterator[Finding]:
-    """Take the edge that is written at a place; a sensor's and a part's is its mount.
+    """Take the edge written at a place; for a sensor or part it is the mount.
 
-    There is none without a parent.
+    Without a parent there is no edge.
     """
     spec = draft.spec
     if keys.parent is None:
@@ -122,9 +121,9 @@ def add_edge(  # noqa: PLR0913 (an edge has that many parts)
 
 
 def add_joint_name(draft: Draft, name: str | None, path: Path) -> Finds[Span | None]:
-    """Take the name of the joint that an entry is, or whose key ``joint`` it is.
+    """Take the joint name of an entry: the entry's name, or its key ``joint``.
 
-    Return its place, None where there is no name.
+    Return its place, None if there is no name.
     """
     if not name:
         return None

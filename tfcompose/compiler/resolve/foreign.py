@@ -1,4 +1,4 @@
-"""Parts that are a URDF or a xacro file, or what one macro of such a file makes."""
+"""Parts from a URDF or xacro file, or from one macro of such a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The computers of a robot, and where processes name theirs."""
+"""The computers of a robot, and the places where processes name theirs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def hosts_of(spec: RobotSpec) -> dict[str, Host]:
     """Return the computers that the file declares, by name.
 
-    Ssh finds one by its name if nothing else is said.
+    The name is also the ssh address unless the file gives another.
     """
     return {
         name: Host(
@@ -40,7 +40,7 @@ def entry_of(process: Process, spec: RobotSpec) -> Path:
 def with_host_place(process: Process, spec: RobotSpec) -> Process:
     """Return the process with the place of its host.
 
-    A component that runs where its container does has none.
+    A component has none: it runs on its container's host.
     """
     host_at = spec.spans.exact_span((*entry_of(process, spec), "host"))
     return replace(process, host_at=host_at)

@@ -1,9 +1,8 @@
 """Robots side by side: frame prefixes, namespaced topics, and names of processes.
 
-A prefix is written in front of every frame that is not shared, as it is (robot_state_publisher's
-``frame_prefix`` does the same). Topics are isolated as Clearpath does it: /tf and /tf_static,
-which are absolute and no namespace moves, are remapped below the namespace for every process at
-once.
+A prefix is put verbatim in front of every frame that is not shared, like robot_state_publisher's
+``frame_prefix``. Topics are isolated as Clearpath does it: /tf and /tf_static are absolute, so a
+namespace does not move them. They are remapped below the namespace for all processes.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def settings_of(ros: RosSpec) -> RosSettings:
-    """Return what all processes share, with the frame prefix that follows from the isolation."""
+    """Return the settings of all processes, with the frame prefix that the isolation implies."""
     namespace = ros.namespace.strip("/")
     prefix = ros.frame_prefix
     if not prefix and ros.isolate in {"frames", "both"} and namespace:
@@ -39,9 +38,9 @@ def settings_of(ros: RosSpec) -> RosSettings:
 
 
 def topics_below(namespace: str, isolate: str) -> dict[str, str]:
-    """Return where the TF topics are moved.
+    """Return the remapped TF topics.
 
-    Below the namespace, if they are isolated and it is one.
+    They are below the namespace if topics are isolated and it is not empty.
     """
     moves = isolate in {"topics", "both"} and namespace
     return {topic: f"/{namespace}{topic}" for topic in GLOBAL} if moves else {}

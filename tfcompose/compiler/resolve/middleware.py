@@ -1,7 +1,4 @@
-"""The middleware that the robot names.
-
-Zenoh's router among its processes, and what cannot work with it.
-"""
+"""The robot's middleware: Zenoh's router among its processes, and findings about conflicts."""
 
 from __future__ import annotations
 
@@ -37,9 +34,9 @@ _PROGRAM = ("rmw_zenoh_cpp", "rmw_zenohd")
 
 
 def is_own_router(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> bool:
-    """Return whether a process is the router that nobody has to declare.
+    """Return whether a process is the router that needs no declaration.
 
-    What stands under its name adds to it.
+    The entry under its name adds keys to it.
     """
     return spec.ros.rmw == "zenoh" and name == ROUTER and not says_how(declared)
 
@@ -101,7 +98,7 @@ def _routers(robot: Robot) -> list[Process]:
 
 
 def use_middleware(draft: Draft) -> Iterator[Finding]:
-    """Let processes wait for Zenoh's router; a part's do so in the robot that holds it."""
+    """Let processes wait for Zenoh's router; those of a part wait in its holder."""
     if draft.holder is None:
         yield from _faults(draft.robot, draft.spec)
         draft.robot = _with_router(draft.robot)

@@ -1,4 +1,4 @@
-"""Optics of a sensor's streams: the preset's values, with the user's over them."""
+"""Optics of a sensor's streams: the preset's values, overridden by the user's."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def optics_of(
 ) -> Finds[tuple[Optics, ...]]:
     """Return the optics of the sensor's streams in ``frames``.
 
-    ``frames`` are the sensor's, its mount among them, before any renaming.
+    ``frames`` are the sensor's, including its mount, before any renaming.
     """
     declared, preset = sensor.spec.optics, sensor.preset
     made = []

@@ -1,7 +1,4 @@
-"""Parameter files that a process names.
-
-What they say to its nodes, with the inline parameters laid over it.
-"""
+"""Parameter files that a process names, overridden by its inline parameters."""
 
 from __future__ import annotations
 
@@ -24,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def read_param_files(draft: Draft) -> Iterator[Finding]:
-    """Lay the parameters of processes over those in files; processes of parts have theirs.
+    """Override the parameters in files with those of processes, for parts separately.
 
     A file may be in a package.
     """
@@ -185,9 +182,9 @@ def _nothing(
 
 
 def matches(pattern: str, name: str) -> bool:
-    """Return whether a pattern of a parameter file means the node.
+    """Return whether a pattern of a parameter file matches the node.
 
-    * is one part of a name, ** any number of them.
+    * matches one part of a name, ** any number of them.
     """
     return _matches(pattern.strip("/").split("/"), name.strip("/").split("/"))
 

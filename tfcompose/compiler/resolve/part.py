@@ -1,4 +1,4 @@
-"""One part: its entry in the holder's file, and what it brings, under its names there."""
+"""One part: its entry in the holder's file, and its contents under the holder's names."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Joined:
 
 @dataclass(slots=True)
 class PartEntry:
-    """One entry of ``parts`` while it is resolved."""
+    """One entry of ``parts`` during resolution."""
 
     name: str
     declared: PartSpec
@@ -49,7 +49,7 @@ class PartEntry:
 
     @property
     def path(self) -> Path:
-        """Where it is written."""
+        """Its path in the robot file."""
         return ("parts", self.name)
 
     @property
@@ -59,9 +59,9 @@ class PartEntry:
 
     @property
     def prefix(self) -> str:
-        """What is written in front of its frames.
+        """The prefix of its frames.
 
-        What is said, or the namespace where frames are isolated by it.
+        As given, or the namespace if that isolates frames.
         """
         if self.declared.prefix is not None:
             return self.declared.prefix
@@ -70,7 +70,10 @@ class PartEntry:
 
     @property
     def isolate(self) -> str:
-        """How it is isolated. Where it has no prefix, its frames are not."""
+        """Its isolation.
+
+        Frames are not isolated if it has no prefix.
+        """
         declared = self.spec.ros.isolate
         return (
             declared
@@ -80,7 +83,7 @@ class PartEntry:
 
     @property
     def settings(self) -> RosSettings:
-        """Settings for the part's processes: the holder's, in its own namespace and prefix."""
+        """Settings for the part's processes: the holder's, with its namespace and prefix."""
         ros = self.spec.ros
         parts = (ros.namespace, self.declared.namespace or "")
         namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
@@ -97,7 +100,7 @@ class PartEntry:
         }
 
     def overlay_on(self, inner: Source) -> Source:
-        """Return the part's source with what the holder says about all its parts laid over it."""
+        """Return the part's source, overlaid with the holder's values for all parts."""
         settings = {
             "namespace": self.settings.namespace,
             "frame_prefix": self.settings.frame_prefix,
@@ -115,7 +118,7 @@ class PartEntry:
     def join(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
         """Return the part under the names that it has in the holder.
 
-        ``implied`` are frames that only that has.
+        ``implied`` are frames that only the holder defines.
         """
         if not _PREFIX.fullmatch(self.prefix):
             span, advice = (
@@ -184,10 +187,10 @@ def _with_owner(edge: Edge, owner: str, span: Span) -> Edge:
 
 
 def subtree(robot: Robot, root: str) -> Robot:
-    """Return what is below ``root``, one of the robot's frames, which becomes the base.
+    """Return the robot below ``root``, one of its frames, which becomes the base.
 
-    Hardware, raw blocks and drivers of sensors are left out with the joints, links and sensors
-    that they belong to.
+    Hardware, raw blocks and drivers of sensors are omitted with the joints, links and sensors that
+    they belong to.
     """
     frames = robot.below(root)
     edges = tuple(edge for edge in robot.edges if edge.child in frames and edge.child != root)

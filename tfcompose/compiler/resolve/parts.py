@@ -1,8 +1,7 @@
-"""Parts: a robot file, URDF or xacro as a subtree, or as a robot beside others.
+"""Parts: a robot file, URDF or xacro as a subtree, or as a separate robot.
 
-A robot file as a part is resolved like any robot, with what the holder says laid over it: values
-of variables, the prefix, the namespace, the shared frames and the isolation. Then a part gets the
-names that it has in the holder.
+A robot file is resolved as a part like any robot, overlaid with the holder's values: variables,
+prefix, namespace, shared frames and isolation. Then its entries get their names in the holder.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ MOST_PARTS = 100
 
 
 def join(draft: Draft, resolve: Resolve) -> Iterator[Finding]:
-    """Resolve the parts of a draft; one that cannot be had is a finding."""
+    """Resolve the parts of a draft; one that cannot be resolved is a finding."""
     spec = draft.spec
     prefix = settings_of(spec.ros).frame_prefix
     for name, declared in spec.parts.items():
@@ -100,7 +99,7 @@ def _validate_part(part: PartEntry, named: str, draft: Draft, read: Reader) -> V
 def take(draft: Draft) -> Iterator[Finding]:
     """Take the parts: their frames, edges and bodies under their new names, and their mounts.
 
-    One that brings names that are there already is refused, and nothing of it is taken.
+    A part with a name that exists already is refused as a whole.
     """
     for part in tuple(draft.joined):
         refusal = _name_clash(draft, part)

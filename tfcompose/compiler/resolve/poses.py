@@ -1,8 +1,8 @@
-"""Poses as they were written become poses of the child in its parent.
+"""Poses as written, solved for the pose of each child in its parent.
 
-``relative_to`` gives a pose in another frame than the parent, ``place`` gives that of another
-frame of the sensor than its mount. Both are solved through fixed edges only: what moves has no
-pose before the robot runs.
+``relative_to`` gives the pose in a frame other than the parent. ``place`` gives the pose of
+another frame of the sensor than its mount. Both are solved through fixed edges only, because a
+moving edge has no pose before the robot runs.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 
 
 def pose_of(posed: Posed, child: str = "") -> Pose:
-    """Return the pose as it is written."""
+    """Return the pose as written."""
     turned = rotation_of(posed, child)
     x, y, z = posed.xyz
     return Pose((float(x), float(y), float(z)), turned if turned is not None else IDENTITY_XYZW)
 
 
 def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, float] | None:
-    """Return the rotation that is written, or None if there is none.
+    """Return the rotation as written, or None if there is none.
 
-    ``look`` of an optical frame is where z points.
+    ``look`` of an optical frame is the direction of z.
     """
     rotation = turned.rotation
     if rotation is not None and turned.look is not None and is_optical(child):
@@ -46,12 +46,12 @@ def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, 
 
 
 def place_of(keys: EdgeKeys | None) -> str | None:
-    """Return the frame whose pose the keys of a mount give, or None for that of the mount."""
+    """Return the frame whose pose the keys of a mount give, or None for the mount itself."""
     return getattr(keys, "place", None)
 
 
 def group_of(edge: Edge) -> Path:
-    """Return the entry of the part or the sensor whose mount the edge is, or in which it is.
+    """Return the entry of the part or sensor that the edge mounts or belongs to.
 
     Empty for any other edge.
     """
@@ -61,7 +61,7 @@ def group_of(edge: Edge) -> Path:
 def solve_poses(draft: Draft) -> Iterator[Finding]:
     """Give each edge the pose of its child in its parent.
 
-    One that cannot be solved keeps the pose as written.
+    An edge that cannot be solved keeps the pose as written.
     """
     excuses = partial(
         may_be_refused,

@@ -1,7 +1,7 @@
-"""Presets: where they are, what each says with all it extends, and what a sensor uses.
+"""Presets: their files, their contents with all they extend, and a sensor's options.
 
-A preset is found when it is used; folders are listed only where a name is wrong, or where all are
-asked for. Presets of nodes are a part of the program, beside its code.
+A preset is looked up when it is used. Folders are listed only for a wrong name, or to list all
+presets. Presets of nodes are part of the program, next to its code.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Sensor:
     tf: str = TFCOMPOSE
 
     def fill_name(self, pattern: str) -> str:
-        """Return a preset's name with the sensor's in it."""
+        """Return a preset's name with the sensor's name inserted."""
         return fill_name(pattern, self.name, self.preset.words)
 
     def holds(self, condition: dict[str, Any]) -> bool:
@@ -60,7 +60,7 @@ class Sensor:
         return holds(condition, self.options, self.tf)
 
     def frames(self) -> dict[str, PresetFrame]:
-        """Return the frames that this sensor has, by their final names before any renaming."""
+        """Return the sensor's frames by their final names, before any renaming of parts."""
         return {
             self.fill_name(name): frame
             for name, frame in self.preset.frames.items()
@@ -70,7 +70,7 @@ class Sensor:
     def parent_of(self, name: str, frame: PresetFrame) -> str:
         """Return the frame's parent before any renaming.
 
-        As the user says, or where its publisher hangs it.
+        As the user gives it, or as its publisher sends it.
         """
         own = self.spec.frames.get(name)
         if own and own.parent:
@@ -80,21 +80,21 @@ class Sensor:
         )
 
     def driver_frames(self) -> dict[str, PresetFrame]:
-        """Return those of its frames that the driver can publish."""
+        """Return the sensor's frames that the driver can publish."""
         return {name: frame for name, frame in self.frames().items() if frame.driver}
 
 
 def fill_name(pattern: str, name: str, words: dict[str, str]) -> str:
-    """Return the pattern with the sensor's name and the preset's words in it."""
+    """Return the pattern with the sensor's name and the preset's words inserted."""
     for hole, means in words.items():
         pattern = pattern.replace(f"{{{hole}}}", means)
     return pattern.replace("{name}", name)
 
 
 def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
-    """Return whether every option has, or holds, the value that the condition names.
+    """Return whether every option has, or contains, the value in the condition.
 
-    ``tf`` counts as one.
+    ``tf`` counts as an option.
     """
     for option, wanted in condition.items():
         value = tf if option == "tf" else options.get(option)
@@ -108,7 +108,7 @@ def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
 def sensor_of(
     name: str, declared: SensorSpec, library: Library, spec: RobotSpec
 ) -> Generator[Finding, None, Sensor | None]:
-    """Return the sensor with its preset and options, or None where it has none."""
+    """Return the sensor with its preset and options, or None if it has no preset."""
     path: Path = ("sensors", name)
     span = spec.span_of((*path, "preset"))
     try:
@@ -180,7 +180,7 @@ def _publisher(sensor: Sensor) -> str:
 def decide_options(
     preset: PresetSpec, declared: SensorSpec, path: Path, spec: RobotSpec
 ) -> tuple[dict[str, Any], list[Finding]]:
-    """Return the values of the preset's options, and what is wrong with those given."""
+    """Return the values of the preset's options, and findings about the given ones."""
     options = {key: option.default for key, option in preset.options.items()}
     findings = []
     for key, value in declared.options.items():
@@ -243,13 +243,13 @@ _DEEPEST = 8
 
 
 class Storage(Protocol):
-    """The folders of presets: which files there are, and what they hold."""
+    """The folders and files of presets."""
 
     def has(self, path: str) -> bool:
-        """Return whether the file is there."""
+        """Return whether the file exists."""
 
     def is_folder(self, path: str) -> bool:
-        """Return whether the folder is there."""
+        """Return whether the folder exists."""
 
     def read(self, path: str) -> str:
         """Return its text; raises RejectedError."""
@@ -258,15 +258,15 @@ class Storage(Protocol):
         """Return the names, vendor/model, of the presets in the folder."""
 
     def packages(self) -> list[str]:
-        """Return the folders that installed Python packages bring.
+        """Return the folders of presets in installed Python packages.
 
-        This is looked up late, as it takes long.
+        The lookup is slow, so it happens only when needed.
         """
 
 
 @dataclass(slots=True)
 class Library:
-    """Presets in folders; an earlier folder stands before a later one, and packages stand last."""
+    """Presets in folders. Earlier folders take precedence, and packages come last."""
 
     folders: tuple[str, ...]
     storage: Storage
@@ -276,7 +276,7 @@ class Library:
     _files: dict[str, str | None] = field(default_factory=dict)
 
     def over(self, folders: Iterable[str]) -> Library:
-        """Return a library with these folders before its own."""
+        """Return a library that searches these folders first."""
         return Library((*map(posixpath.normpath, folders), *self.folders), self.storage, self.own)
 
     @property
@@ -286,7 +286,7 @@ class Library:
         return sorted(name for name in known if "/_" not in name and _NAME.fullmatch(name))
 
     def file(self, name: str) -> str | None:
-        """Return the preset's file, or None where there is none of that name."""
+        """Return the preset's file, or None if there is no preset of that name."""
         if name not in self._files:
             self._files[name] = self._find(name, self.folders) or self._find_late(name)
         return self._files[name]
@@ -297,7 +297,7 @@ class Library:
         return mine if mine and self.file(name) != mine else None
 
     def source(self, name: str, deep: int = 0) -> Source:
-        """Return what the preset says, laid over what it extends.
+        """Return the preset's contents, laid over the preset that it extends.
 
         Raises:
             KeyError: if there is none of that name.
@@ -423,7 +423,7 @@ def is_node_preset(name: str) -> bool:
 
 
 def unknown_node_preset(name: str, span: Span) -> Finding:
-    """Return the finding for a name that no preset of a node has."""
+    """Return the finding for an unknown name of a node's preset."""
     names = node_preset_names()
     return finding(
         "TF601",
@@ -434,9 +434,9 @@ def unknown_node_preset(name: str, span: Span) -> Finding:
 
 
 def preset_of(node: NamedNode | None) -> str | None:
-    """Return the name of a node's preset, None where it has none.
+    """Return the name of a node's preset, None if it has none.
 
-    A node's own name that is PACKAGE/NAME of a preset is that, too.
+    A node whose own name is a preset's PACKAGE/NAME has that preset.
     """
     if node is None or node.preset is not None:
         return node.preset if node else None
@@ -446,9 +446,9 @@ def preset_of(node: NamedNode | None) -> str | None:
 
 
 def start_advice(node: NamedNode | None, otherwise: str) -> str:
-    """Return advice for a process that does not say what to start.
+    """Return advice for a process without a program to start.
 
-    If its node's name is nearly PACKAGE/NAME of a preset, that is probably meant.
+    If its node's name is close to a preset's PACKAGE/NAME, suggest that preset.
     """
     package, _, short = (node.name or "" if node else "").rpartition("/")
     near = nearest(
@@ -458,7 +458,7 @@ def start_advice(node: NamedNode | None, otherwise: str) -> str:
 
 
 def name_of(node: NamedNode | None) -> str | None:
-    """Return the name that a node was given, None where that is its preset's."""
+    """Return the name given to a node, None if it is its preset's name."""
     if node is None or (node.preset is None and preset_of(node)):
         return None
     return node.name

@@ -1,4 +1,4 @@
-"""Processes: what is started, simulated or expected, its names, and how it ends.
+"""Processes: start, simulation or external owner, names, and end.
 
 tfcompose's own processes are here as well: ``static``, ``joints`` and ``guard``.
 """
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
 
 
 def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Finds[Process | None]:
-    """Return the process that the user describes, or None where something is missing."""
+    """Return the process that the user describes, or None if something is missing."""
     spec = validated.spec
     path: Path = ("processes", name)
     span = spec.key_span(path)
@@ -198,9 +198,9 @@ def check_names(draft: Draft) -> Iterator[Finding]:
 
 
 def check_waits(draft: Draft) -> Iterator[Finding]:
-    """Yield a finding for each unknown name under ``after`` and each end that never comes.
+    """Yield a finding for each unknown name under ``after`` and each impossible end.
 
-    An entry that was refused may have brought another name.
+    A name that a refused entry may have added is not reported.
     """
     spec, known = draft.spec, draft.process_names
     refused = {name for _, name in draft.broken}
@@ -243,7 +243,7 @@ _FIELDS = frozenset(field.name for field in fields(Process) if field.init)
 
 
 def how(declared: StartedSpec | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:
-    """Return the fields of a process that runs in this way, by the keys that have their names."""
+    """Return the fields of a process that runs in this way, from the keys of the same names."""
     stated: dict[str, Any] = {}
     for key in _FIELDS & keys_of(way):
         value = getattr(declared, key)
@@ -259,7 +259,7 @@ def how(declared: StartedSpec | ContainerSpec, namespace: str, way: Way = "run")
 
 
 def program(run: Run, *, shell: bool) -> dict[str, Any]:
-    """Return what is started: a package's program, a launch file, or a command.
+    """Return the program to start: a package's program, a launch file, or a command.
 
     A shell's command is one text.
     """
@@ -316,7 +316,7 @@ _KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "gu
 
 
 def built_in_processes(spec: RobotSpec) -> list[Process]:
-    """Return tfcompose's own processes, with what stands of them under ``processes``."""
+    """Return tfcompose's own processes, with their keys under ``processes``."""
     own = []
     for name in BUILT_IN:
         declared = spec.processes.get(name)
@@ -332,9 +332,9 @@ def built_in_processes(spec: RobotSpec) -> list[Process]:
 
 
 def says_how(declared: ProcessSpec | None) -> bool:
-    """Return whether it is said how a process runs.
+    """Return whether the entry says how its process runs.
 
-    Else what stands under its name adds to one of tfcompose's own.
+    Otherwise the entry adds keys to one of tfcompose's own processes.
     """
     return declared is not None and bool(
         declared.run or declared.external or declared.simulate or declared.component
@@ -342,9 +342,9 @@ def says_how(declared: ProcessSpec | None) -> bool:
 
 
 def add_process(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
-    """Return a process that tfcompose adds, with what stands under its name.
+    """Return a process that tfcompose adds, with the keys under its name.
 
-    It runs where ``static`` does.
+    It runs on the host of ``static``.
     """
     if declared:
         stated = how(declared, spec.ros.namespace, "built-in")
@@ -356,7 +356,7 @@ def add_process(process: Process, declared: ProcessSpec | None, spec: RobotSpec)
 
 
 def check_built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield findings about what stands under the name of one of tfcompose's own processes."""
+    """Yield findings about entries named after tfcompose's own processes."""
     path: Path = ("processes", name)
     known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
     wrong = declared.model_fields_set - known
@@ -395,7 +395,7 @@ def _joints_params(params: dict[str, Any], spec: RobotSpec) -> Iterator[Finding]
 
 
 def check_keys(draft: Draft) -> Iterator[Finding]:
-    """Yield a finding for each key of a process that does nothing there."""
+    """Yield a finding for each key of a process that has no effect there."""
     spec = draft.spec
     yield from _idle_of_containers(spec)
     for name, process in spec.processes.items():
@@ -504,7 +504,7 @@ FILE_KEY = "file"
 def full_name(namespace: str, name: str) -> str:
     """Return a node's, topic's or service's full name.
 
-    Below the namespace unless it begins with a slash.
+    Below the namespace, unless it begins with a slash.
     """
     if name.startswith("/"):
         return name
@@ -514,7 +514,7 @@ def full_name(namespace: str, name: str) -> str:
 def namespace_of(declared: StartedSpec | ContainerSpec | None, namespace: str) -> str:
     """Return the namespace of a process's nodes, without a leading slash.
 
-    Its own, or the robot's ``namespace``.
+    The process's own, or the robot's ``namespace``.
     """
     if declared is None or declared.namespace is None:
         return namespace
@@ -585,9 +585,8 @@ PERIOD_S = 6.0
 def set_positions(draft: Draft) -> Iterator[Finding]:
     """Let simulated joint states cover every independent joint.
 
-    A joint that mimics another is left out: it follows, and the process computes it. Where nothing
-    is said a joint is at 0, or in the middle between its limits if 0 is not between them, as
-    joint_state_publisher has it.
+    A joint that mimics another is omitted: the process computes it. A joint without a position is
+    at 0, or in the middle of its limits if they exclude 0, as in joint_state_publisher.
     """
     robot, spec = draft.robot, draft.spec
     processes = []

@@ -1,4 +1,4 @@
-"""A robot under other names: what it is called as a part of another one."""
+"""A robot under the names that it has as a part of another one."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ class Names:
         return name if name in self.shared else f"{self.prefix}{name}"
 
     def joint(self, name: str) -> str:
-        """Return the joint's name, if it has one."""
+        """Return the joint's name; empty without one."""
         return f"{self.prefix}{name}" if name else name
 
     def process(self, name: str) -> str:
-        """Return the name of a process, or of a sensor."""
+        """Return the name of a process or sensor."""
         return name if name in BUILT_IN and not self.alone else f"{self.part}/{name}"
 
 

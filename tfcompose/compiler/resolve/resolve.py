@@ -1,6 +1,6 @@
-"""From what the user wrote to a robot in which every name, pose and owner is decided.
+"""Resolution of a robot file into a robot with final names, poses and owners.
 
-``PASSES`` are the steps, in order; what needs a module that only some robots need is loaded here.
+``PASSES`` are the steps, in order. A module that only some robots need is imported here on demand.
 """
 
 from __future__ import annotations
@@ -66,11 +66,11 @@ def resolve(
     disk: Disk | None = None,
     holder: Draft | None = None,
 ) -> tuple[Draft, list[Finding]]:
-    """Return the draft, whose robot is resolved, right or wrong, and what was found.
+    """Return the draft with the resolved robot, valid or not, and the findings.
 
-    Its presets are expanded, parts joined, poses solved and owners given. ``read`` gives the text
-    of a calibration or a part; without ``disk`` no mesh and no package is looked for. ``holder``
-    is what the robot is a part of.
+    Presets are expanded, parts joined, poses solved and owners assigned. ``read`` returns the text
+    of a calibration or a part; without ``disk`` meshes and packages are not looked up. ``holder``
+    is the robot that includes this one.
     """
     collected = holder.collected if holder else Collected()
     draft = Draft(validated, library, read, disk, collected=collected, holder=holder)
@@ -81,7 +81,7 @@ def resolve(
 
 
 def add_processes(draft: Draft) -> Iterator[Finding]:
-    """Take tfcompose's own processes, those of tools, the containers, and what the user starts."""
+    """Take tfcompose's own processes, those of tools, the containers, and the user's."""
     spec = draft.spec
     draft.processes += [*built_in_processes(spec), *([] if draft.holder else own_router(spec))]
     yield from add_sections(draft)
@@ -102,7 +102,7 @@ def add_processes(draft: Draft) -> Iterator[Finding]:
 
 
 def join_parts(draft: Draft) -> Iterator[Finding]:
-    """Resolve the parts, and note what was refused in them."""
+    """Resolve the parts, and record their refused entries."""
     if draft.spec.parts:
         from tfcompose.compiler.resolve.parts import join
 
@@ -127,7 +127,7 @@ def measure_mounts(draft: Draft) -> Iterator[Finding]:
 
 
 def assemble(draft: Draft) -> Iterator[Finding]:
-    """Make the robot of what the passes before this one left."""
+    """Make the robot from the results of the earlier passes."""
     spec, validated = draft.spec, draft.validated
     limits = yield from limits_of(spec)
     parts = [part.robot for part in draft.joined]
@@ -182,9 +182,9 @@ def add_blocks(draft: Draft) -> Iterator[Finding]:
 
 
 def find_base(draft: Draft) -> Iterator[Finding]:
-    """Find where the URDF begins: as written; base_link, or a fixed base_footprint above it.
+    """Find the root of the URDF: as written; base_link, or a fixed base_footprint above it.
 
-    Else the only root.
+    Otherwise the only root.
     """
     robot, base = draft.robot, draft.spec.base
     if base is None:

@@ -51,7 +51,7 @@ def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
 
 
 def zones_of(spec: RobotSpec) -> tuple[Zone, ...]:
-    """Return the zones that the file wants to be seen."""
+    """Return the zones that sensors of the robot must cover."""
     return tuple(
         Zone(
             name,

@@ -1,4 +1,4 @@
-"""Sensors on their mounts: the mount edge, the frames inside, the body and the driver of each."""
+"""Sensors on their mounts: the mount edge, inner frames, body and driver of each."""
 
 from __future__ import annotations
 
@@ -274,7 +274,7 @@ PARAMS_FILE = "${params_file}"
 def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None, list[Finding]]:
     """Return the process of a sensor's driver with the parameters that the spec implies.
 
-    It is the preset's with the user's keys over it, the user's alone where the preset has none, or
+    It is the preset's, overridden by the user's keys; the user's alone if the preset has none; or
     None.
     """
     driver, declared = sensor.preset.driver, sensor.spec.driver
@@ -424,7 +424,10 @@ def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
 
 
 def claims_of(sensor: Sensor) -> tuple[DriverClaim, ...]:
-    """Return the outside edges that the driver publishes by default, without its mount."""
+    """Return the edges outside the sensor that its driver publishes by default.
+
+    The mount is not among them.
+    """
     driver, declared = sensor.preset.driver, sensor.spec
     own = {sensor.name, declared.driver.process if declared.driver else None}
     return () if driver is None or (declared.owner and declared.owner in own) else driver.claims

@@ -1,11 +1,9 @@
-"""A stock robot_state_publisher in the place of tfcompose's own.
+"""A stock robot_state_publisher instead of tfcompose's own.
 
-It publishes what its URDF holds as fixed or jointed.
-
-Facts of robot_state_publisher 3.3 (ROS 2 Jazzy): fixed joints go to /tf_static, moving ones follow
-``joint_states``, floating ones are skipped; ``frame_prefix`` is written in front of every frame;
-at most ``publish_frequency`` times a second, 20 by default, a joint state is passed on;
-``robot_description`` is published by it too.
+It publishes the fixed edges and joints of its URDF. Facts of robot_state_publisher 3.3 (ROS 2
+Jazzy): fixed joints go to /tf_static, moving ones follow ``joint_states``, floating ones are
+skipped; ``frame_prefix`` is put in front of every frame; it passes on joint states at most
+``publish_frequency`` times a second, 20 by default; it also publishes ``robot_description``.
 """
 
 from __future__ import annotations
@@ -27,14 +25,14 @@ if TYPE_CHECKING:
 
 
 def use_stock_publisher(draft: Draft) -> Iterator[Finding]:
-    """Put a stock robot_state_publisher in the place of ``joints``, where the file wants one."""
+    """Replace ``joints`` with a stock robot_state_publisher if the file asks for one."""
     if draft.spec.ros.state_publisher == "stock" and draft.robot.base is not None:
         yield from stock_faults(draft.robot)
         draft.robot = with_stock(draft.robot)
 
 
 def stock_faults(robot: Robot) -> Iterator[Finding]:
-    """Yield what a stock publisher cannot do for a robot with a base."""
+    """Yield findings about the joints and frames that a stock publisher cannot send correctly."""
     described = robot.described_frames()
     for edge in robot.edges:
         if (

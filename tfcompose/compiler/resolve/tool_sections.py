@@ -1,7 +1,4 @@
-"""Hooks of tools whose sections a robot file has.
-
-The processes that they add, and what they check.
-"""
+"""Hooks of tools that have sections in a robot file: added processes and checks."""
 
 from __future__ import annotations
 
@@ -36,16 +33,16 @@ class ToolSection:
     read: Callable[[str], str] | None
 
     def span_of(self, *path: str | int) -> Span:
-        """Return the place of a value in the section, or of the nearest around it."""
+        """Return the place of a value in the section, or of the nearest enclosing one."""
         return self.spec.span_of((self.key.name, *path))
 
     def key_span(self, *path: str | int) -> Span:
-        """Return the place of a key in the section, or of the nearest around it."""
+        """Return the place of a key in the section, or of the nearest enclosing one."""
         return self.spec.key_span((self.key.name, *path))
 
 
 def sections_of(draft: Draft) -> list[ToolSection]:
-    """Return the sections of tools that a robot file has, without those that were refused.
+    """Return the sections of tools in a robot file, without refused ones.
 
     Those of a part have no effect.
     """
@@ -56,7 +53,7 @@ def sections_of(draft: Draft) -> list[ToolSection]:
 
 
 def as_sections(draft: Draft) -> dict[str, Section]:
-    """Return the sections as rules find them in ``Robot.sections``."""
+    """Return the sections in the form of ``Robot.sections``, for rules."""
     return {
         section.key.name: Section(
             section.key.name,
@@ -71,7 +68,7 @@ def as_sections(draft: Draft) -> dict[str, Section]:
 def add_sections(draft: Draft) -> Iterator[Finding]:
     """Take the processes that tools add, with their keys from ``processes``.
 
-    One whose name has an entry that says how it runs is not added: the entry takes its place.
+    If the entry under its name says how the process runs, the entry replaces it.
     """
     for section in sections_of(draft):
         processes = yield from _hook(section, section.key.processes)
@@ -86,7 +83,7 @@ def add_sections(draft: Draft) -> Iterator[Finding]:
 
 
 def check_sections(draft: Draft) -> Iterator[Finding]:
-    """Yield what tools find in their sections, of the robot and of files that they name."""
+    """Yield the tools' findings about their sections and the files named there."""
     for section in sections_of(draft):
         findings = yield from _hook(section, section.key.check, draft.robot)
         yield from findings

@@ -1,8 +1,7 @@
 """Raw blocks: elements kept verbatim, and the parts of the robot that they name.
 
-A block is read as the content of a ``<robot>`` that has the first line to itself: places are those
-in that document. A ``<ros2_control>`` element becomes a hardware component where that can say all
-that is in it.
+A block is read as the content of a ``<robot>`` tag on a line before it; places are those in that
+document. A ``<ros2_control>`` element becomes a hardware component if that keeps everything in it.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ def read_block(text: str, file: str, *, with_text: bool = False) -> Element:
 def faults_of(
     root: Element, frames: Collection[str], joints: Collection[str]
 ) -> Iterator[Finding]:
-    """Yield what is wrong with the elements of a block."""
+    """Yield findings about the elements of a block."""
     if not root.children:
         yield finding("TF719", "the block has no element", root.span, help="remove it")
     for element in root.children:
@@ -99,7 +98,7 @@ def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
 
 
 def find_unexpanded(text: str, file: str) -> Iterator[Finding]:
-    """Yield a finding for each substitution of xacro or launch in the text of a block."""
+    """Yield a finding for each xacro or launch substitution in the text of a block."""
     for match in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
         before = text[: match.start()]
         line, column = before.count("\n") + 2, match.start() - before.rfind("\n")
@@ -142,14 +141,14 @@ def unknown_references(
 
 
 def unknown_joint(name: str, span: Span, joints: Collection[str]) -> Finding:
-    """Return the finding that none of the ``joints``, the moving ones, has this name."""
+    """Return the finding that none of ``joints``, the moving ones, has this name."""
     there = f"the robot has {list_names(joints, _MOST_NAMED)}"
     advice = did_you_mean(name, joints, there if joints else "no joint of the robot moves")
     return finding("TF703", f"no moving joint {name}", span, help=advice)
 
 
 def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
-    """Yield a finding for each hardware joint that is no moving joint of the robot."""
+    """Yield a finding for each hardware joint that is not a moving joint of the robot."""
     for system in hardware:
         for component in system.components:
             if component.kind == "joint" and component.name not in joints:
@@ -161,8 +160,7 @@ def within(
 ) -> Block | None:
     """Return the block of a robot without elements about other frames and joints.
 
-    What is about neither the robot's frames nor its joints stays. None is returned where no
-    element is left.
+    Elements that name no frame and no joint are kept. None: no element is left.
     """
     elements = read_block(block.text, robot.file).children
     all_joints = {edge.joint_name for edge in robot.edges}
@@ -178,9 +176,9 @@ def within(
 
 
 def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
-    """Return the hardware with these of its joints only.
+    """Return the hardware with only these of its joints.
 
-    None where it had some, and none is left.
+    None if it had joints and none is left.
     """
     left = tuple(
         component
@@ -209,7 +207,7 @@ class _UnsupportedError(Exception):
 
 
 def with_hardware(robot: Robot) -> Robot:
-    """Return the robot of a URDF with ros2_control blocks as hardware, if nothing is lost."""
+    """Return the robot of a URDF with ros2_control blocks as hardware, if that is lossless."""
     hardware: dict[str, Hardware] = {}
     blocks = []
     for block in robot.blocks:

@@ -1,6 +1,6 @@
-"""From the elements of a URDF to a robot, with the places of that file.
+"""Conversion of URDF elements to a robot, with places in the URDF file.
 
-Whatever is wrong with it is a finding.
+Faults in the file are findings.
 """
 
 from __future__ import annotations
@@ -90,14 +90,14 @@ class Converted:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """All that was found."""
+        """All findings."""
         return (*self.of_elements, *self.of_blocks, *self.of_files)
 
 
 def robot_of(root: Element, file: str, find: Finder, included: Collection[str] = ()) -> Converted:
     """Return the robot that the URDF describes.
 
-    ``find`` looks for the files of meshes and textures. ``included`` are further files that its
+    ``find`` looks up the files of meshes and textures. ``included`` are further files that its
     elements come from.
 
     Raises:

@@ -1,7 +1,8 @@
-"""Xacro files, expanded by xacro itself; what xacro refuses is a finding at its place in the file.
+"""Expansion of xacro files by xacro itself; its errors become findings at their places.
 
-xacro runs confined in a process of its own, which asks here for each file. It names the expression
-and the macros that it stopped at, and neither line nor column: they are looked for here.
+xacro runs confined in a separate process, which requests each file from this one. It reports the
+expression and the macros where it stopped, but neither line nor column, so this module searches
+for them.
 """
 
 from __future__ import annotations
@@ -80,10 +81,7 @@ _LONGEST, _DEEPEST = 4000, 100
 
 @dataclass(frozen=True, slots=True)
 class Sandbox:
-    """How xacro is run: what it may read.
-
-    And who is told what it prints and what does not hold it.
-    """
+    """Limits of a xacro run, and callbacks for its output and missing confinement."""
 
     reach: Reach = field(default_factory=Reach)
     print_output: Callable[[str, str], None] = lambda _file, _text: None
@@ -99,10 +97,10 @@ def expand(
     use: Use | None = None,
     sandbox: Sandbox | None = None,
 ) -> Expansion:
-    """Return what xacro makes of a file, or of a call of one of its macros.
+    """Return the expansion of a file, or of a call of one of its macros.
 
-    ``packages`` answer $(find …). What may be read are the trees of the file that names it, the
-    package that it is in and those that it finds, beside what the sandbox has.
+    ``packages`` resolve $(find …). Readable are the trees of the file that names it, of the
+    package that contains it and of those that it finds, besides those of the sandbox.
 
     Raises:
         RejectedError: if xacro refuses the file, or needs too much for it; with the findings where

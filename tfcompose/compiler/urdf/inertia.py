@@ -40,7 +40,7 @@ class UnmeasurableError(Exception):
 class Moments:
     """Volume in m³, centre in m, and the tensor about it (xx, xy, xz, yy, yz, zz) in m⁵.
 
-    Kg m² at 1 kg/m³.
+    The tensor is also in kg m² at 1 kg/m³.
     """
 
     volume: float
@@ -89,7 +89,7 @@ class Moments:
 
 
 def join_moments(parts: Sequence[Moments]) -> Moments:
-    """Return the moments of what the parts make together; where they overlap, both count."""
+    """Return the sum of the moments; overlapping volumes count twice."""
     if len(parts) == 1:
         return parts[0]
     volume = math.fsum(part.volume for part in parts)
@@ -116,8 +116,8 @@ def of_primitive(shape: Shape) -> Moments:
 def inertial(moments: Moments, density: float, mass: float | None = None) -> Inertial:
     """Return the inertia of a solid of this density (kg/m³), in the axes of its moments.
 
-    ``mass`` (kg) is what the density follows from, if it does: computed back it would be off by a
-    rounding.
+    ``mass`` (kg) is the exact mass if the density was derived from it. Recomputing it would add a
+    rounding error.
     """
     noise = density * _NOISE * trace(moments.tensor)
     xx, xy, xz, yy, yz, zz = (density * value for value in moments.tensor)
@@ -131,7 +131,7 @@ def inertial(moments: Moments, density: float, mass: float | None = None) -> Ine
 
 
 def of_primitives(mass: float, shapes: Sequence[Shape]) -> Inertial:
-    """Return the inertia of a body of this mass (kg) and one density, in its shapes' axes."""
+    """Return the inertia of a body of this mass (kg) and uniform density, in its shapes' axes."""
     moments = join_moments([of_primitive(shape) for shape in shapes])
     return inertial(moments, mass / moments.volume, mass)
 
@@ -142,7 +142,7 @@ def trace(tensor: Tensor) -> float:
 
 
 def traces(mass: float, *bodies: tuple[Shape, ...]) -> tuple[float, ...]:
-    """Return the tensor's trace at this mass and one density for each primitive body."""
+    """Return the tensor's trace at this mass and uniform density for each primitive body."""
     primitives = [
         shapes for shapes in bodies if shapes and not any(shape.mesh for shape in shapes)
     ]

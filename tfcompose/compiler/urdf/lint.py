@@ -28,9 +28,9 @@ _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 def lint_urdf(
     file: str, packages: Packages, arguments: Mapping[str, str] | None = None
 ) -> list[Finding]:
-    """Return what is wrong with the file, by place.
+    """Return the findings about the file, by place.
 
-    A xacro file is expanded; places are where elements are written.
+    A xacro file is expanded. Places are in the files where elements are written.
     """
     try:
         document = read_urdf(file, packages, arguments)
@@ -50,11 +50,11 @@ class Document:
 
     @property
     def robot(self) -> Robot:
-        """The robot that it describes."""
+        """The robot that the document describes."""
         return self.converted.robot
 
     def findings(self) -> list[Finding]:
-        """Return what is wrong with it, by place, but for what its comments allow."""
+        """Return the findings about it, by place, without those that its comments allow."""
         roots = self.robot.roots()
         robot = replace(with_hardware(self.robot), base=roots[0] if len(roots) == 1 else None)
         found = dict.fromkeys([*self.converted.findings, *check(robot, _RULES)])
@@ -65,9 +65,9 @@ class Document:
 def read_urdf(
     file: str, packages: Packages, arguments: Mapping[str, str] | None = None
 ) -> Document:
-    """Return what the file holds.
+    """Return the file's document.
 
-    A xacro file, by its name or by what is in it, is expanded, with arguments.
+    A xacro file, recognised by name or content, is expanded with the arguments.
 
     Raises:
         RejectedError: if it cannot be read, or is no URDF; or takes no arguments, and is given

@@ -1,8 +1,8 @@
 """The robot as a macro for other people's xacro, and a file that calls it.
 
 The macro has a prefix, a parent and an origin. Its body is the robot's URDF with ``${prefix}`` in
-front of the name of every link, joint, material and piece of hardware; what xacro would evaluate
-otherwise is escaped. Of two materials of one name readers take the first colour.
+front of the name of every link, joint, material and piece of hardware. Text that xacro would
+evaluate is escaped. If two materials share a name, readers take the first colour.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ _TAGS = frozenset(
 
 
 def macro_name(robot: str) -> str:
-    """Return what the robot's macro is called.
+    """Return the name of the robot's macro.
 
-    As the robot, unless xacro or Python has the word.
+    It is the robot's name unless that is reserved in xacro or Python.
     """
     return f"{robot}_robot" if robot in _TAGS or keyword.iskeyword(robot) else robot
 
@@ -129,9 +129,9 @@ def _names(robot: Robot) -> list[str]:
 
 
 def caller(robot: Robot) -> str:
-    """Return the file that is the robot alone.
+    """Return the file that describes the robot alone.
 
-    The macro, called with arguments of the same names.
+    It calls the macro with arguments of the same names.
     """
     defaults = {"prefix": "", "parent": "", "xyz": "0 0 0", "rpy": "0 0 0"}
     arguments = "\n".join(

@@ -1,9 +1,7 @@
 """Lookup of packages and files.
 
-It asks the robot's ``packages:``, then the ament index, then the folders around the file.
-
-Nothing is opened here. What may be asked about files is handed in, so that a robot can be compiled
-from text alone.
+The order is the robot's ``packages:``, the ament index, then the folders around the file. Nothing
+is opened here. Access to files is passed in, so that a robot can be compiled from text alone.
 """
 
 from __future__ import annotations
@@ -84,7 +82,7 @@ class Packages:
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def candidates(self, name: str) -> list[str]:
-        """Return the folders that a package of that name may be in, in the order of looking."""
+        """Return the possible folders of a package, in search order."""
         own = [find_path(*self.named[name])] if name in self.named else []
         return own + [
             posixpath.join(prefix, "share", name)
@@ -92,9 +90,9 @@ class Packages:
         ]
 
     def folder(self, name: str, file: str) -> str | None:
-        """Return the package's folder, or None where there is none.
+        """Return the package's folder, or None if it is not found.
 
-        The last candidate is the package of ``file``.
+        The last candidate is the package that contains ``file``.
         """
         if self.disk is None:
             return None
@@ -119,7 +117,7 @@ class Packages:
     def path_of(self, named: str, span: Span) -> str:
         """Return the path of a file that is named at a place.
 
-        In a package, or relative to the file there.
+        It is in a package, or relative to the file of the place.
 
         Raises:
             RejectedError: if the package is not found.
@@ -133,11 +131,11 @@ class Packages:
         return posixpath.join(folder, match[2])
 
     def asset(self, uri: str, span: Span, document: str = "") -> tuple[Asset, Finding | None]:
-        """Return the file that is addressed at a place, and what is wrong with the address.
+        """Return the file that is addressed at a place, and findings about the address.
 
-        ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files;
-        relative ones begin in the folder of the file that names them, or of the ``document`` that
-        includes it. Other schemes (``http``, ``model``) are for others to resolve.
+        ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files.
+        Relative paths begin in the folder of the file that names them, or of the ``document`` that
+        includes it. Other schemes (``http``, ``model``) are left to other programs.
         """
         document = document or span.file
         url = _MEANT.fullmatch(uri)

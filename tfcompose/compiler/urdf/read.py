@@ -109,10 +109,10 @@ class _Origin:
 
 
 class Element:
-    """A tag with its attributes and child elements; ``text`` is its own text, if it was asked for.
+    """A tag with its attributes and child elements; ``text`` is its own text, if requested.
 
-    ``begin`` and ``end`` are the bytes at which its first and its last tag begin. Places are those
-    in the text, or, of an expanded document, in the file that the element comes from.
+    ``begin`` and ``end`` are the byte offsets of its first and last tag. Places are in the text
+    or, for an expanded document, in the file that the element comes from.
     """
 
     __slots__ = ("_origin", "_source", "attributes", "begin", "children", "end", "tag", "text")
@@ -153,18 +153,18 @@ class Element:
         return text[begin : end + 1]
 
     def all(self, tag: str) -> list[Element]:
-        """Return the children of a tag."""
+        """Return the children with this tag."""
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child of a tag, or None."""
+        """Return the first child with this tag, or None."""
         for child in self.children:
             if child.tag == tag:
                 return child
         return None
 
     def walk(self) -> Iterator[Element]:
-        """Yield this element and all in it, in the order of the text."""
+        """Yield this element and all elements in it, in document order."""
         waiting = [self]
         while waiting:
             element = waiting.pop()
@@ -172,7 +172,7 @@ class Element:
             waiting += reversed(element.children)
 
     def value_span(self, name: str) -> Span:
-        """Return the place of an attribute's value, or the element's where it is missing."""
+        """Return the place of an attribute's value, or the element's if it is missing."""
         declared = self._declared_origin()
         place = declared.source.tag_at(declared.begin)[0].get(name)
         return declared.source.span(place[0], place[1] - place[0] or 1) if place else self.span
@@ -180,19 +180,19 @@ class Element:
     def raw_value(self, name: str) -> str:
         """Return an attribute's value as in the text.
 
-        XML turns tabs and line breaks in it into spaces.
+        XML replaces tabs and line breaks in it with spaces.
         """
         begin, end = self._source.tag_at(self._source.position(self.begin))[0].get(name, (0, 0))
         return self._source.text[begin:end]
 
     @property
     def has_broken_values(self) -> bool:
-        """Whether in the text a value of some attribute holds a tab or a line break."""
+        """Whether an attribute value contains a tab or a line break in the text."""
         return self._source.has_broken_values
 
 
 def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
-    """Return the document's root; ``with_text``, elements have their own text too.
+    """Return the document's root; ``with_text``: elements have their own text too.
 
     Raises:
         RejectedError: if the text is not XML, declares entities, or is too large or too deep.
@@ -207,7 +207,7 @@ def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
 def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) -> Element:
     """Return the root of the document that xacro made of a file.
 
-    Elements are placed where they were written.
+    Elements have the places where they were written.
 
     Raises:
         RejectedError: as ``read_xml``.

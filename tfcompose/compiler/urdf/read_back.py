@@ -1,9 +1,8 @@
 """Comparison of a written URDF with the robot it was written from, value by value.
 
-yourdfpy reads the links and joints of the URDF. It does not read other elements
-(``ros2_control``, ``gazebo``, ``transmission``), takes the first of elements that are there twice,
-and puts URDF's defaults where an element or an attribute is missing, so that none of this is
-noticed.
+yourdfpy reads the links and joints of the URDF. It ignores other elements (``ros2_control``,
+``gazebo``, ``transmission``), takes the first of duplicate elements, and fills in URDF's defaults
+for missing elements and attributes, so the comparison does not detect faults there.
 """
 
 from __future__ import annotations
@@ -37,11 +36,10 @@ _MOMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Iterator[str]:
-    """Yield what the text says otherwise than the robot.
+    """Yield the differences between the text and the robot.
 
-    About links, joints, poses, masses and shapes.
-
-    ``full`` is as in ``urdf``; the text is what that, or ``emit``, returned for the same target.
+    It compares links, joints, poses, masses and shapes. ``full`` is as in ``urdf``; the text is
+    the result of that function, or of ``emit``, for the same target.
     """
     try:
         ET.fromstring(text)  # noqa: S314 (our own text); yourdfpy would mend what is not XML, and go on

@@ -1,9 +1,7 @@
-"""The words of URDF and what they hold.
+"""The vocabulary of URDF: elements, attributes, shapes, joint types and attribute values.
 
-Elements, attributes, shapes, types of joints, and the values of attributes.
-
-A word or a value that is none is a finding. Source: the URDF XML specification of ROS (link,
-joint, robot). What transmissions, Gazebo and ros2_control blocks hold is not checked.
+An unknown word or an invalid value is a finding. Source: the URDF XML specification of ROS (link,
+joint, robot). The contents of transmissions, Gazebo and ros2_control blocks are not checked.
 """
 
 from __future__ import annotations
@@ -83,9 +81,8 @@ _MISSPELT = 0.8
 def unknown_words(root: Element) -> Iterator[Finding]:
     """Yield a finding for each element and attribute that URDF does not have.
 
-    An error where a known one is misspelt.
-
-    Others may be an extension, and are warnings; directly below <robot> they are accepted.
+    A misspelling of a known one is an error. Others may be an extension and are warnings. Directly
+    below <robot> they are accepted.
     """
     waiting = [root]
     while waiting:
@@ -154,12 +151,12 @@ class AttributeReader:
     def refuse(
         self, message: str, span: Span, advice: str = "", severity: Severity = "error"
     ) -> None:
-        """Note that a value is wrong."""
+        """Add a finding about an invalid value."""
         self.findings.append(finding("TF721", message, span, help=advice, severity=severity))
         self.refused += severity == "error"
 
     def text(self, element: Element, name: str, example: str) -> str:
-        """Return an attribute that must be there, or an empty text."""
+        """Return a required attribute, or an empty text."""
         value = element.attributes.get(name, "")
         if not value:
             self.refuse(f"<{element.tag}> has no {name}", element.span, f"for example {example}")
@@ -170,7 +167,7 @@ class AttributeReader:
     ) -> tuple[float, ...]:
         """Return an attribute's numbers, as many as ``default`` has.
 
-        That is taken where there are none.
+        ``default`` replaces missing or invalid ones.
         """
         if element is None or name not in element.attributes:
             return default
@@ -202,15 +199,15 @@ class AttributeReader:
         return values
 
     def number(self, element: Element | None, name: str, default: Any = None) -> Any:
-        """Return an attribute's number; ``default`` is taken where there is none."""
+        """Return an attribute's number, ``default`` if it is missing, 0 if it is invalid."""
         if element is None or name not in element.attributes:
             return default
         return self.numbers(element, name, (0.0,))[0]
 
     def read_bound(self, element: Element, name: str) -> float | None:
-        """Return an attribute's number that limits something.
+        """Return an attribute's number that is a limit; None without one.
 
-        One that limits nothing is as large as numbers may be.
+        A finite limit beyond ``HUGE`` is reduced to it, with a warning.
         """
         try:
             value = float(element.attributes.get(name, ""))
@@ -224,7 +221,7 @@ class AttributeReader:
         return used
 
     def pose(self, parent: Element) -> Pose:
-        """Return the pose that the element's origin gives."""
+        """Return the pose in the element's origin."""
         origin = parent.first("origin")
         x, y, z = self.numbers(origin, "xyz", (0.0, 0.0, 0.0))
         if origin is not None and "quat_xyzw" in origin.attributes:
@@ -257,9 +254,9 @@ class AttributeReader:
 
 
 def version_of(root: Element, values: AttributeReader) -> tuple[int, ...]:
-    """Return the version of URDF that the document declares.
+    """Return the URDF version that the document declares.
 
-    A finding where parsers of ROS 2 Jazzy reject it.
+    A version that parsers of ROS 2 Jazzy reject is a finding.
     """
     text = root.attributes.get("version", "1.0")
     version = tuple(map(int, text.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", text) else ()

@@ -41,13 +41,11 @@ quoted = lru_cache(maxsize=1 << 16)(quoteattr)
 
 
 def urdf(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[str, str]:
-    """Return the URDF of everything below ``robot.base``, which must be there, in a right tree.
+    """Return the URDF below ``robot.base``, in full and for a stock publisher.
 
-    In full, and for stock.
-
-    In full it holds every edge as it is, whoever publishes it. For a stock robot_state_publisher
-    edges of other owners are floating joints, which that node leaves alone. ``target`` says how
-    files are addressed.
+    The base must exist, in a valid tree. The full URDF has every edge as it is, whoever publishes
+    it. For a stock robot_state_publisher, edges of other owners are floating joints, which that
+    node ignores. ``target`` says how files are addressed.
     """
     writer = UrdfWriter(target)
     head = ('<?xml version="1.0"?>', f"<robot name={quoted(robot.name)}>")
@@ -57,14 +55,14 @@ def urdf(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[str, str]:
 
 
 def block_lines(blocks: Iterable[Block]) -> list[str]:
-    """Return raw blocks verbatim, but for their indentation."""
+    """Return raw blocks verbatim, except for their indentation."""
     return [indent(dedent(block.text).strip("\n"), "  ") for block in blocks]
 
 
 class UrdfWriter:
     """Writes links, joints and hardware as lines.
 
-    How names and values are spelt is for subclasses to change.
+    Subclasses can change the spelling of names and values.
     """
 
     def __init__(self, target: Target = AS_IN_SOURCE) -> None:
@@ -75,15 +73,15 @@ class UrdfWriter:
         return quoted(text)
 
     def value(self, text: str) -> str:
-        """Return another attribute's value in quotes."""
+        """Return the value of any other attribute in quotes."""
         return quoted(text)
 
     def content(self, text: str) -> str:
-        """Return what an element holds."""
+        """Return the content of an element."""
         return escape(text)
 
     def parameter(self, text: str) -> str:
-        """Return what a parameter of hardware holds."""
+        """Return the content of a hardware parameter."""
         return self.content(text)
 
     def address(self, asset: Asset) -> str:
@@ -93,10 +91,9 @@ class UrdfWriter:
     def body(self, robot: Robot) -> tuple[list[str], list[str]]:
         """Return the URDF elements below ``robot.base``, in full and for a stock publisher.
 
-        A frame of unknown pose is left out with what is below it, and a comment says so.
-
-        For a stock publisher the root has no inertia: it has no use for one, and KDL, which it
-        reads URDF with, takes none there and warns at each start.
+        A frame of unknown pose is omitted with the frames below it, and a comment says so. For a
+        stock publisher the root has no inertia: KDL, which that node uses to read URDF, supports
+        none there and warns at each start.
         """
         if robot.base is None:
             raise ValueError(f"{robot.name} has no base")
@@ -176,7 +173,7 @@ class UrdfWriter:
         return f"      <material name={self.name(material.name)}>{inside}</material>"
 
     def joint(self, edge: Edge, name: str, kind: str) -> list[str]:
-        """Return the joint that an edge is, of this type."""
+        """Return the joint of this type for an edge."""
         lines = [
             f'  <joint name={self.name(name)} type="{kind}">',
             f"    <parent link={self.name(edge.parent)}/>",
@@ -313,7 +310,7 @@ def _joint_names(edges: list[Edge]) -> list[str]:
 
 
 def joint_type(edge: Edge) -> str:
-    """Return what URDF calls the joint that the edge is."""
+    """Return URDF's joint type of the edge."""
     joint = edge.joint or edge.free
     if joint:
         return joint.type

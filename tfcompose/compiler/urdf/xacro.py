@@ -1,4 +1,4 @@
-"""Macros of a xacro file: what they define, how one is called, and the result.
+"""Macros of a xacro file: their parameters, a call of one, and the result.
 
 ``expand`` runs xacro, ``macro`` writes a macro.
 """

@@ -1,8 +1,8 @@
-"""xacro in a confined process of its own: it evaluates expressions, which may ask for anything.
+"""xacro in a separate, confined process, because it evaluates arbitrary expressions.
 
-It can open no file. It asks who started it for packages, texts and lists of folders, then answers
-with what xacro made, or why it stopped. It imports xacro and of tfcompose the sandbox alone,
-because each expansion starts one.
+It cannot open files. It requests packages, texts and folder listings from its parent process, then
+answers with xacro's result or the reason why it stopped. It imports only xacro and tfcompose's
+sandbox, because each expansion starts one.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _ALLOW = "tfcompose:"
 
 
 class LimitError(Exception):
-    """The expansion asks for more than a robot needs."""
+    """The expansion exceeds a limit."""
 
 
 class MissingError(LookupError):
@@ -60,15 +60,15 @@ class MissingError(LookupError):
 
 
 class OutsideDocumentError(Exception):
-    """A file lies outside of what the document may read."""
+    """A file is outside the trees that the document may read."""
 
 
 class UnsafeError(Exception):
-    """An expression uses names that lead out of it."""
+    """An expression uses names that give access outside its sandbox."""
 
 
 class XacroFiles:
-    """What xacro reads, by asking who started this process."""
+    """Files for xacro, requested from the parent process."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -165,7 +165,7 @@ class _Builder(expatbuilder.ExpatBuilderNS):
 
 
 class XacroRun:
-    """Runs xacro on a request; ``note`` keeps what is being evaluated."""
+    """Runs xacro on a request; ``note`` records what is being evaluated."""
 
     def __init__(self, files: XacroFiles, note: Callable[[str], None]) -> None:
         self._reader = files
@@ -427,7 +427,7 @@ def _names_in(code: CodeType) -> Iterator[str]:
 
 
 def main(reads: int, writes: int, noted: int) -> None:
-    """Serve one request; ``noted`` is a file that keeps what is being evaluated."""
+    """Serve one request; ``noted`` is a file that records what is being evaluated."""
     channel = Channel(reads, writes)
     request = channel.receive()
     limit(request["wall_s"])

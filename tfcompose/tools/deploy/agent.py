@@ -1,14 +1,14 @@
-"""The far end of a deployment: what is done on a host.
+"""The agent of a deployment: it acts on a host.
 
-``connection`` sends this file's text over ssh to the host's Python, which runs it: it needs the
-standard library alone, and no tfcompose. It answers requests, one line of JSON each, in their
-order, until its input ends. If that happens while a release is on trial, whoever deploys is gone,
-and it goes back to the release before by itself.
+``connection`` sends this file's text over ssh to the host's Python, which runs it: it needs only
+the standard library, not tfcompose. It answers requests, one line of JSON each, in order, until
+its input ends. If that happens while a release is on trial, the deploying computer is gone, and
+the agent returns to the previous release by itself.
 
-On the host, ``base`` holds ``releases/NAME``, the link ``current`` to the one that systemd starts,
-the link ``previous`` to the one before, and ``lock``. A release on trial is started by a drop-in
-(or, the first time, a unit) in the runtime directory, so that a host that loses its power starts
-the release before.
+On the host, ``base`` holds ``releases/NAME``, the link ``current`` to the release that systemd
+starts, the link ``previous`` to the one before, and ``lock``. A release on trial is started by a
+drop-in (or, the first time, a unit) in the runtime directory, so that a host that loses power
+starts the previous release.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env
 
 
 class HostError(Exception):
-    """Raised where something cannot be done on this host; the message says why."""
+    """Raised when something cannot be done on this host; the message gives the reason."""
 
 
 def digest_of(data: bytes) -> str:
-    """Return the name that a manifest has for the content."""
+    """Return the content's digest, as in a manifest."""
     return hashlib.sha256(data).hexdigest()
 
 
@@ -140,14 +140,13 @@ class Agent:
         return found
 
     def clock(self) -> float:
-        """Return the time of this host's clock, in seconds since 1970."""
+        """Return the time of this host's clock, in Unix seconds."""
         return time.time()
 
     def state(self) -> dict[str, Any]:
-        """Return the releases, the current one's digests, the unit, and what runs.
+        """Return the releases, the current one's digests, the unit, and the running release.
 
-        ``unsettled`` says that somebody's trial was never ended: what runs is not the current
-        release.
+        ``unsettled``: a trial was never ended, so the running release is not the current one.
         """
         release = self._release("current")
         shown = self._show_unit()
@@ -171,13 +170,13 @@ class Agent:
     def texts(self, paths: list[str], *, any_size: bool = False) -> dict[str, str | None]:
         """Return the texts of files of the current release.
 
-        None for one that is absent, no text, or too large.
+        None for a file that is absent, too large, or not text.
         """
         most = None if any_size else MOST_TEXT
         return {path: _text(self.base / "current" / path, most) for path in paths}
 
     def take_lock(self, who: str) -> dict[str, Any]:
-        """Take this host's lock until this process ends; say who holds it, if somebody does."""
+        """Take this host's lock until this process ends. If it is taken, name its holder."""
         self.base.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(self.base / "lock", os.O_CREAT | os.O_RDWR, 0o600)
         try:
@@ -194,14 +193,14 @@ class Agent:
     # The new release.
 
     def chunk(self, data: str) -> None:
-        """Take a part of the archive of a release."""
+        """Take a chunk of a release's archive."""
         if self.archive is None:
             self.base.mkdir(parents=True, exist_ok=True)
             self.archive = tempfile.TemporaryFile(dir=self.base)  # noqa: SIM115 (it lives until it is unpacked)
         self.archive.write(base64.b64decode(data))
 
     def unpack(self, release: str, *, wheels: bool) -> None:
-        """Make the release's folder of the archive; whoever finds it finds it complete."""
+        """Unpack the archive into the release's folder, which appears only when complete."""
         folder, new = self.base / "releases" / release, self.base / "releases" / f".{release}.new"
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir(parents=True)
@@ -228,7 +227,7 @@ class Agent:
                 raise
 
     def rehearse(self, release: str, host: str) -> list[dict[str, Any]]:
-        """Return what keeps the release from being started on this host, as findings."""
+        """Return findings that prevent a start of the release on this host."""
         folder = self.base / "releases" / release
         python = self._python_of(folder)
         done = self._program([*self._start(python), "rehearse", str(folder / "plan.json"), host])
@@ -248,14 +247,14 @@ class Agent:
     # The change itself.
 
     def stop(self) -> None:
-        """End what runs."""
+        """Stop the running release."""
         shown = self._show_unit()
         self.trial = {"active": shown.get("ActiveState") in {"active", "activating", "reloading"}}
         if shown.get("LoadState") == "loaded":
             self._must("stop", self.unit)
 
     def start(self, release: str) -> None:
-        """Start a release on trial, by a drop-in of the old unit or its own unit."""
+        """Start a release on trial, by a drop-in for the existing unit or by a new unit."""
         self.running = folder = self.base / "releases" / release
         unit = self._unit_of(release).replace(f"{self.base}/current/", f"{folder}/")
         if (self.units / self.unit).is_file():
@@ -272,9 +271,9 @@ class Agent:
         self._must("start", self.unit)
 
     def follow(self, release: str, host: str) -> str:
-        """Let what runs follow a release on trial, and return what its launcher says of that.
+        """Let the launcher follow a release on trial, and return its answer.
 
-        A launcher that cannot is ended, and the release started.
+        A launcher that cannot is stopped, and the release started.
         """
         self.trial = {"active": True, "host": host}
         _write(
@@ -315,7 +314,7 @@ class Agent:
         return done.stdout.strip().rpartition("; ")[2] or "nothing starts again"
 
     def wait(self, seconds: float) -> dict[str, Any]:
-        """Return the status once the robot is ready, it has failed, or after so many seconds."""
+        """Return the status once the robot is ready or failed, or after the timeout."""
         end = time.monotonic() + seconds
         while not self.gone.is_set():
             left = end - time.monotonic()
@@ -352,7 +351,7 @@ class Agent:
         return shown.get("ActiveState") == "failed" or _restarts(shown) > self.restarts
 
     def commit(self, release: str) -> None:
-        """Keep the release on trial: ``current`` leads to it from now on."""
+        """Keep the release on trial: ``current`` now points to it."""
         before = self._release("current")
         _write(self.units / self.unit, self._unit_of(release))
         _link(self.base / "current", f"releases/{release}")
@@ -365,15 +364,13 @@ class Agent:
         self._prune()
 
     def settle(self) -> None:
-        """Make what was kept final: the end of the input takes nothing back any more."""
+        """Make the commit final: the end of the input no longer reverts it."""
         self.trial = None
 
     def back(self) -> dict[str, Any] | None:
-        """Return to the release before the trial, which runs again if it ran.
+        """Return to the release before the trial, and start it if it was running.
 
-        Also after ``commit``.
-
-        None where nothing is on trial.
+        Also after ``commit``. None: no release is on trial.
         """
         trial, self.trial, self.running = self.trial, None, None
         if trial is None:
@@ -408,7 +405,7 @@ class Agent:
     # Everything else.
 
     def execute(self, argv: list[str]) -> None:
-        """Become tfcompose with these words, where the robot runs.
+        """Replace this process with tfcompose and these arguments, in the robot's environment.
 
         Under the user's systemd, or the system's.
         """
@@ -651,7 +648,7 @@ _REQUESTS = (
 
 
 def serve() -> None:
-    """Answer the requests on standard input until it ends; then take back what is on trial."""
+    """Answer the requests on standard input until it ends, then revert a release on trial."""
     gone = threading.Event()
     requests: queue.Queue[bytes] = queue.Queue()
 

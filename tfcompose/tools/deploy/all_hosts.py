@@ -23,12 +23,11 @@ if TYPE_CHECKING:
 def run_on_all_hosts(
     arguments: Namespace, command: str, *words: str, processes: Sequence[str] = ()
 ) -> int:
-    """Run the command with these words on every host, and print what it prints there.
+    """Run the command with these arguments on every host, and print the output.
 
-    Return the worst exit code.
-
-    With ``processes`` it is about these, and goes only to hosts that run any of them. Lines have
-    their host before them. Objects of ``--format json`` have it as a key; ``ps`` gives one list.
+    Return the worst exit code. ``processes`` limits it to these processes and to hosts that run
+    any of them. Each line begins with its host. Objects of ``--format json`` have it as a key;
+    ``ps`` gives one list.
 
     Raises:
         SystemExit: after saying why there are no hosts.

@@ -1,4 +1,4 @@
-"""Connections to the hosts, by asyncssh: each runs the agent there, which answers requests."""
+"""Connections to the hosts, by asyncssh. Each host runs the agent, which answers requests."""
 
 from __future__ import annotations
 
@@ -57,22 +57,22 @@ class Settings:
 
 
 def agent_command(python: str) -> str:
-    """Return the shell's command that starts the agent.
+    """Return the shell command that starts the agent.
 
-    It takes no module from a user's folder.
+    It imports no module from a user's folder.
     """
     program = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
     return f"exec {program} -I -c {shlex.quote(START)}"
 
 
 def agent_input(settings: Settings) -> bytes:
-    """Return what the agent reads before any request: its program and its settings."""
+    """Return the start of the agent's input: its program and its settings."""
     agent = Path(__file__).with_name("agent.py").read_bytes()
     return f"{len(agent)}\n".encode() + agent + f"{json.dumps(asdict(settings))}\n".encode()
 
 
 def settings_of(robot: str, name: str, host: PlanHost, *, system: bool = False) -> Settings:
-    """Return what the agent of a robot's host is given first."""
+    """Return the settings for the agent of a robot's host."""
     share = f"{robot}.{name}"
     return Settings(
         share, f"tfcompose-{share}.service", host.python or "python3", host.setup, system
@@ -80,15 +80,15 @@ def settings_of(robot: str, name: str, host: PlanHost, *, system: bool = False) 
 
 
 class LostError(Exception):
-    """Raised where a host does not answer any more; the message says how that shows."""
+    """Raised when a host no longer answers; the message describes the symptom."""
 
 
 class RefusedError(Exception):
-    """Raised where a host cannot do what it is asked; the message is its reason."""
+    """Raised when a host cannot carry out a request; the message gives the reason."""
 
 
 class ConnectedHost:
-    """A host that is connected. ``span`` is its place in the robot file."""
+    """A connected host. ``span`` is its place in the robot file."""
 
     def __init__(
         self,
@@ -140,9 +140,9 @@ class ConnectedHost:
         return None
 
     async def clock_offset_s(self) -> float:
-        """Return by how much the host's clock is ahead of this one, in seconds.
+        """Return how far the host's clock is ahead of this one, in seconds.
 
-        That of the quickest answer.
+        Measured with the quickest answer.
         """
         readings: list[tuple[float, float]] = []
         for _ in range(CLOCK_READINGS):
@@ -153,12 +153,12 @@ class ConnectedHost:
         return min(readings)[1]
 
     async def execute(self, argv: list[str]) -> asyncssh.SSHClientProcess[bytes]:
-        """Let the agent become tfcompose with these words, and return its process."""
+        """Let the agent become tfcompose with these arguments, and return its process."""
         self._process.stdin.write(f'["execute", {json.dumps({"argv": argv})}]\n'.encode())
         return self._process
 
     async def close(self) -> None:
-        """End the agent, which takes back what was not settled, and the connection."""
+        """End the agent, which reverts a release on trial, and the connection."""
         try:
             self._process.stdin.write_eof()
             await asyncio.wait_for(self._process.wait_closed(), ANSWER_S)
@@ -171,7 +171,7 @@ class ConnectedHost:
 async def connect_host(
     name: str, host: PlanHost, settings: Settings, span: Span | None
 ) -> ConnectedHost | Finding:
-    """Return the host, with its agent, or why it cannot be reached."""
+    """Return the host with its agent, or the reason why it cannot be reached."""
     user, _, address = host.ssh.rpartition("@")
     options: dict[str, Any] = {"username": user} if user else {}
     options |= {"port": host.port} if host.port is not None else {}

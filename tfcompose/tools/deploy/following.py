@@ -46,7 +46,7 @@ def _places(plan: Plan) -> dict[str, str | None]:
 def same_files(before: Mapping[str, str], after: Mapping[str, str]) -> bool:
     """Return whether two releases, by their manifests, differ only in built files.
 
-    The readers of other files are unknown.
+    Which processes read the other files is unknown.
     """
     kinds = (f"{NAMED}/", f"{WHEELS}/")
     named = [

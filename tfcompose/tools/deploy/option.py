@@ -28,10 +28,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(command: str, arguments: Namespace) -> int | None:
-    """Run the command on all hosts and return the worst exit code.
-
-    None without ``--all-hosts``.
-    """
+    """Run the command on all hosts; return the worst exit code. None without ``--all-hosts``."""
     if not arguments.all_hosts:
         if arguments.file:
             fail("--file goes with --all-hosts", UNREADABLE)

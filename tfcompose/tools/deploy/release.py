@@ -1,4 +1,4 @@
-"""A release: a robot's built files and what they name, in a folder on each host."""
+"""A release: a robot's built files and the files they name, in a folder on each host."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Release:
 
     @cached_property
     def manifest(self) -> dict[str, str]:
-        """The digests of the files' content, by their paths."""
+        """The digest of each file's content, by path."""
         built = {path: digest_of(text.encode()) for path, text in self.texts.items()}
         return built | {path: digest_of(file.read_bytes()) for path, file in self.copies.items()}
 
@@ -89,7 +89,7 @@ class Release:
 
     @property
     def has_wheels(self) -> bool:
-        """Whether it brings a Python of its own."""
+        """Whether the release has its own Python environment."""
         return any(path.startswith(f"{WHEELS}/") for path in self.copies)
 
     def with_text(self, path: str, text: str) -> Release:
@@ -99,7 +99,7 @@ class Release:
         return made
 
     def archive(self) -> Iterator[bytes]:
-        """Yield the files as a tar archive, in parts."""
+        """Yield the files as a tar archive, in chunks."""
         buffer = io.BytesIO()
         with tarfile.open(fileobj=buffer, mode="w", format=tarfile.PAX_FORMAT) as tar:
             for path, text in self.texts.items():
@@ -113,7 +113,7 @@ class Release:
 
 
 def name_of(manifest: Mapping[str, str]) -> str:
-    """Return the name of the release that has these files, by their digests."""
+    """Return the name of the release with these files, by their digests."""
     return digest_of(repr(sorted(manifest.items())).encode())[:NAME_LENGTH]
 
 
@@ -129,10 +129,9 @@ def _add(
 
 
 def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
-    """Return the release of a right robot, whose relative paths begin in this folder.
+    """Return the release of a valid robot, whose relative paths begin in this folder.
 
-    Files keep their places to each other, so that a map finds its picture, and a mesh its
-    textures.
+    Files keep their relative places, so that a map finds its image and a mesh its textures.
 
     Raises:
         RejectedError: with what is named and cannot be copied.

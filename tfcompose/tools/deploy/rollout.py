@@ -1,9 +1,8 @@
-"""The order in which a release comes to all hosts, or to none.
+"""The steps that bring a release to all hosts, or to none.
 
-Ask every host what it has; take every lock; send the release and rehearse it. Only then end what
-runs, on all hosts, start the release on trial, and wait until every edge of every host is live;
-launchers that can follow the release go on meanwhile. Then keep it everywhere, or go back
-everywhere.
+Ask every host for its state; take every lock; send the release and rehearse it. Then stop all
+hosts, start the release on trial, and wait until every edge of every host is live. Launchers that
+can follow the release keep running. Finally keep it everywhere, or go back everywhere.
 """
 
 from __future__ import annotations
@@ -94,12 +93,12 @@ class Share:
 
     @property
     def wanted(self) -> Release:
-        """The release that it is compared with."""
+        """The release that the host's current one is compared with."""
         assert self.release is not None, "it is made before anything is compared"  # noqa: S101
         return self.release
 
     def describe(self) -> str:
-        """Return what the host has, in words."""
+        """Return a description of the host."""
         probe = self.probe
         version = f"tfcompose {probe['tfcompose']}" if probe["tfcompose"] else "no tfcompose"
         logout = (
@@ -108,9 +107,9 @@ class Share:
         return f"Python {probe['python']}, {version}{logout}"
 
     def changes(self) -> list[str]:
-        """Return what is to change on the host, one line each.
+        """Return the changes on the host, one line each.
 
-        Nothing if it runs the release as it is.
+        Empty if it runs the release unchanged.
         """
         if self.release is None:
             return [f"release {self.state['release']} → {self.goal}"]
@@ -136,7 +135,7 @@ class Share:
 
 
 class Rollout:
-    """A deployment to connected hosts. ``report`` is given lines about what is done."""
+    """A deployment to connected hosts. ``report`` takes progress messages."""
 
     def __init__(
         self, target: DeployTarget, shares: list[Share], report: Callable[[str], None]
@@ -148,7 +147,7 @@ class Rollout:
     # Before anything changes.
 
     async def examine(self) -> list[Finding]:
-        """Return what is in the way on the hosts, and apart between them."""
+        """Return findings about the hosts, and about differences between them."""
         offsets = await self._by_name(lambda share: share.host.clock_offset_s())
         findings = [finding for share in self.shares for finding in self._unfit(share)]
         findings += _clocks_apart(offsets, self.target)
@@ -173,7 +172,7 @@ class Rollout:
             )
 
     async def compare(self, release: Release) -> None:
-        """Learn what each host has, and what it would have with this release."""
+        """Read the state of each host, and compute its goal with this release."""
         states = await self._by_name(lambda share: share.host.ask("state"))
         for share in self.shares:
             share.state = states[share.name]
@@ -217,7 +216,7 @@ class Rollout:
         return not late and name_of(state["files"]) == state["release"]
 
     def strangers(self) -> list[Finding]:
-        """Return which robots run on hosts without having been deployed."""
+        """Return findings about robots that run on hosts without a deployment."""
         return [
             finding(
                 "TF914",
@@ -231,22 +230,22 @@ class Rollout:
         ]
 
     def changes(self) -> dict[str, list[str]]:
-        """Return what is to change, by host, one line each.
+        """Return the changes by host, one line each.
 
-        No host that has its goal, and runs it.
+        A host that already runs its goal is missing.
         """
         found = {share.name: share.changes() for share in self.shares}
         return {name: lines for name, lines in found.items() if lines}
 
     def describe(self) -> str:
-        """Return which releases run where, in words."""
+        """Return which releases run on which hosts, in words."""
         return list_names(
             [f"{share.name} runs release {share.state['release']}" for share in self.shares],
             NAMED_AT_MOST,
         )
 
     async def difference(self) -> list[str]:
-        """Return the lines of a unified difference of all texts that would change."""
+        """Return the lines of a unified diff of all texts that would change."""
         lines: list[str] = []
         for share in self.shares:
             there, wanted = share.state["files"], share.wanted.manifest
@@ -270,7 +269,7 @@ class Rollout:
     # The change.
 
     async def lock(self) -> None:
-        """Take the locks of all hosts, in one order for everybody.
+        """Take the locks of all hosts, in the same order in every deployment.
 
         Raises:
             RejectedError: with who holds one.
@@ -285,7 +284,7 @@ class Rollout:
                 )
 
     async def send(self) -> None:
-        """Bring the release to the hosts that do not have it, and rehearse it there.
+        """Send the release to the hosts that lack it, and rehearse it there.
 
         Raises:
             RejectedError: with what keeps it from being started; nothing runs otherwise than
@@ -331,12 +330,10 @@ class Rollout:
         ]
 
     async def activate(self) -> str:
-        """Start each host's goal on trial, and keep it once everything is live.
+        """Start each host's goal on trial, and keep it once every edge is live.
 
-        Return what there is to say.
-
-        A host that has its goal already, and runs it, goes on; on one that can follow, only what
-        is different starts again.
+        Return the summary. A host that already runs its goal keeps running; one that can follow
+        restarts only the processes that differ.
 
         Raises:
             RejectedError: with what is missing, or which host was lost, and what the others went
@@ -392,11 +389,11 @@ class Rollout:
         return lambda share: self._ask(share, "wait", seconds=seconds)
 
     def not_live(self) -> list[Finding]:
-        """Return what was not live on the hosts when they were compared."""
+        """Return findings about edges and processes that were not live at the comparison."""
         return [problem for share in self.shares for problem in self._missing(share, share.state)]
 
     async def plan_return(self) -> None:
-        """Let the goal of each host be the release before.
+        """Make the previous release each host's goal.
 
         Raises:
             RejectedError: if a host has none.
@@ -548,7 +545,7 @@ async def _probe(host: ConnectedHost) -> dict[str, Any]:
 def target_of(
     plan: Plan, names: Sequence[str], places: Mapping[str, Span], **options: Any
 ) -> DeployTarget:
-    """Return what is deployed to: all hosts that have processes, or the named ones.
+    """Return the target of a deployment: all hosts with processes, or the named ones.
 
     ``options`` are those of ``DeployTarget``.
 

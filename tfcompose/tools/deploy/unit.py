@@ -1,4 +1,4 @@
-"""The unit that systemd runs for a robot on a host."""
+"""The systemd unit of a robot on a host."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Turns a plan into files for other launchers: systemd units, a compose file, a ROS 2 launch file.
+"""Exports of a plan for other launchers: systemd units, a compose file, a ROS 2 launch file.
 
-Each module is one format. It returns the files, and sentences about what of the plan they do not
-keep. Must not import ``model``, ``resolve``, ``launcher``: exports know the plan, not the robot.
+Each module is one format. It returns the files, and a sentence for each property of the plan that
+they lose. Must not import ``model``, ``resolve``, ``launcher``: exports know the plan, not the
+robot.
 """

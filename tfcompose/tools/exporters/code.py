@@ -1,4 +1,4 @@
-"""Python source in short lines."""
+"""Python source with short lines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WIDTH = 100
 
 @dataclass(frozen=True, slots=True)
 class CodeBlock:
-    """An expression in brackets: the text before its parts, the parts, and the text after them."""
+    """A bracketed expression: the text before its parts, the parts, and the text after them."""
 
     begin: str
     parts: tuple[CodeBlock | str, ...]
@@ -24,7 +24,7 @@ class CodeBlock:
         return f"{self.begin}{', '.join(map(str, self.parts))}{self.end}"
 
     def lines(self, indent: str = "", end: str = "") -> Iterator[str]:
-        """Yield one line if it is short enough, else one line for each part."""
+        """Yield one line if it is short enough, else one line per part."""
         if len(indent) + len(str(self)) + len(end) <= _WIDTH:
             yield f"{indent}{self}{end}"
             return
@@ -39,17 +39,17 @@ class CodeBlock:
 
 
 def call(name: str, *parts: CodeBlock | str) -> CodeBlock:
-    """Return the call of a function."""
+    """Return a function call."""
     return CodeBlock(f"{name}(", parts, ")")
 
 
 def items(parts: Iterable[CodeBlock | str], keyword: str = "") -> CodeBlock:
-    """Return a list, or a keyword with one."""
+    """Return a list, or a keyword argument that is one."""
     return CodeBlock(f"{keyword}=[" if keyword else "[", tuple(parts), "]")
 
 
 def keyword(name: str, value: CodeBlock | str) -> CodeBlock | str:
-    """Return a keyword with its value."""
+    """Return a keyword argument."""
     return (
         f"{name}={value}"
         if isinstance(value, str)

@@ -1,8 +1,8 @@
 """A plan for Kubernetes: a ConfigMap, a workload per process, and a kustomization.
 
-What runs on is a StatefulSet of one pod, because only a StatefulSet promises at most one: it
-starts no second pod before the first has ended, in an update, after a deletion or when a node is
-lost, so that no edge has two publishers
+A process that keeps running is a StatefulSet of one pod, because only a StatefulSet promises at
+most one: it starts no second pod before the first has ended, in an update, after a deletion or
+when a node is lost, so that no edge has two publishers
 (https://kubernetes.io/docs/concepts/workloads/controllers/statefulset/). A Deployment does not,
 even with ``Recreate``.
 """
@@ -72,7 +72,7 @@ def cluster_name(name: str) -> str:
 
 
 def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
-    """Return what the process reads of the plan's folder, by paths relative to it.
+    """Return the files in the plan's folder that the process reads, by relative path.
 
     The plan is first.
     """
@@ -87,7 +87,7 @@ def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
 def kubernetes(
     plan: Plan, cluster: Cluster, texts: Mapping[str, str]
 ) -> tuple[tuple[File, ...], list[str]]:
-    """Return the manifests, and what they do not keep of the plan.
+    """Return the manifests, and the properties of the plan that they lose.
 
     ``texts`` are the files of all processes, ``files_of``, by their paths in the plan's folder.
     """

@@ -161,14 +161,12 @@ def included(package, name, arguments, settings, **more):
 def launch(
     plan: Plan, machine: Machine, urdf: str, values: LaunchValues | None = None
 ) -> tuple[tuple[File, ...], list[str]]:
-    """Return the launch file, and what it does not keep of the plan.
+    """Return the launch file, and the properties of the plan that it loses.
 
-    ``urdf`` is the text of ``STOCK_DESCRIPTION``, beside the plan.
-
-    A stock robot_state_publisher sends what that URDF holds as fixed or jointed, and a
-    static_transform_publisher each fixed edge elsewhere; where the URDF is not all of what
-    tfcompose's own publishers send, these are started instead. ``values`` are what the launch file
-    decides itself.
+    ``urdf`` is the text of ``STOCK_DESCRIPTION``, next to the plan. A stock robot_state_publisher
+    sends the fixed edges and joints of that URDF, and a static_transform_publisher each other
+    fixed edge. If the URDF lacks some edges of tfcompose's own publishers, these are started
+    instead. ``values`` are decided by the launch file at its start.
     """
     export = _Export(plan, values or LaunchValues())
     stock = _stock(plan, urdf)
@@ -663,7 +661,7 @@ def _variables(plan: Plan) -> Iterator[tuple[str, str]]:
 def edges_published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
     """Return the edges (parent, child) that a stock robot_state_publisher sends of this URDF.
 
-    All but floating ones.
+    Floating joints are omitted.
     """
     joints = [
         joint

@@ -1,8 +1,8 @@
-"""Arguments of a robot file that stay arguments of the exported launch file.
+"""Arguments of a robot file that the exported launch file keeps as arguments.
 
-An argument stays one where it decides no more than whether processes are started, and words,
-parameters, remappings and variables that they are given. One that decides anything else has the
-value that the export was given, or its default.
+An argument is kept if it only decides whether processes start, and their command-line arguments,
+parameters, remappings and variables. Any other argument has the value given to the export, or its
+default.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _ARGUMENT = re.compile(r"\s*args\.([A-Za-z_][A-Za-z0-9_]*)\s*")
 def collect_launch_values(
     arguments: Namespace, plan: Plan
 ) -> tuple[LaunchValues, tuple[File, ...], list[str]]:
-    """Return what the launch file decides itself, the files it needs, and what is fixed.
+    """Return the launch file's values, the files it needs, and the fixed arguments.
 
     ``plan`` is the built one. The robot file has no errors.
     """

@@ -1,7 +1,7 @@
 """Values that an exported launch file decides at its start: arguments, environment, conditions.
 
-A plan has the values with which it was built. Where they decide no more than whether processes are
-started and what these are told, a launch file can have the arguments themselves.
+A plan has the values of its build. A launch file can keep the arguments that only decide whether
+processes start and which texts they get.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class LaunchArgument:
     env: str | None = None
 
     def code(self) -> CodeBlock:
-        """Return its declaration."""
+        """Return the code that declares it."""
         default: CodeBlock | str = repr(self.default)
         if self.env:
             default = call(
@@ -61,7 +61,7 @@ class LaunchArgument:
 
 @dataclass(frozen=True, slots=True)
 class ArgumentValue:
-    """The value of an argument, inside of a text or as all of it."""
+    """The value of an argument, as a part of a text or as all of it."""
 
     name: str
     kind: str
@@ -69,7 +69,7 @@ class ArgumentValue:
 
 @dataclass(frozen=True, slots=True)
 class VariableValue:
-    """The value of an environment variable, or what stands for it."""
+    """The value of an environment variable, or its default."""
 
     name: str
     default: str | None
@@ -100,13 +100,13 @@ class LaunchValues:
 
 
 def text_code(text: Text) -> CodeBlock | str:
-    """Return the substitutions that make a text."""
+    """Return the substitutions for a text."""
     parts = [_part(part) for part in text]
     return parts[0] if len(parts) == 1 else items(parts)
 
 
 def parameter_code(text: Text) -> CodeBlock | str:
-    """Return the substitutions as the value of a parameter, with its type."""
+    """Return the substitutions for a parameter's value, with its type."""
     only, *rest = text
     kind = _TYPES[only.kind] if not rest and isinstance(only, ArgumentValue) else "str"
     return call("ParameterValue", text_code(text), f"value_type={kind}")

@@ -1,9 +1,7 @@
-"""A plan for other supervisors.
+"""A plan for other supervisors: a systemd unit or a docker compose service per process.
 
-A unit for systemd, or a service for docker compose, for each process.
-
-What they and ``kubernetes`` share comes first: names, the order of starts, restarts, probes and
-the YAML of the files.
+The first part is shared with ``kubernetes``: names, start order, restarts, probes and the YAML of
+the files.
 """
 
 from __future__ import annotations
@@ -48,14 +46,14 @@ class Machine:
 
 
 def plain_name(name: str) -> str:
-    """Return the name with nothing that units and services may not have in theirs."""
+    """Return the name without characters that units and services do not allow."""
     return _NO_NAME.sub("-", name)
 
 
 def plain_names(plan: Plan, plain_of: Callable[[str], str] = plain_name) -> dict[str, str]:
-    """Return the plain name of each process, by its own.
+    """Return each process's plain name, by its own name.
 
-    No two are the same, and one that is plain stays.
+    Plain names are unique, and a name that is already plain is kept.
     """
     return distinct([process.name for process in plan.processes], plain_of)
 
@@ -63,7 +61,7 @@ def plain_names(plan: Plan, plain_of: Callable[[str], str] = plain_name) -> dict
 def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str, str]:
     """Return the plain form of each name, by the name.
 
-    No two are the same, and one that is plain stays.
+    Plain names are unique, and a name that is already plain is kept.
     """
     made = {name: name for name in names if plain_of(name) == name}
     names_in_use = set(made)
@@ -79,12 +77,12 @@ def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str
 
 
 def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:
-    """Return the words that start the process as ``tfcompose up`` does."""
+    """Return the command that starts the process as ``tfcompose up`` does."""
     return [*anywhere(python), "exec", plan_file, process.name]
 
 
 def exported_processes(plan: Plan) -> dict[str, Exported]:
-    """Return the processes as another supervisor starts them, by their names."""
+    """Return the processes as another supervisor starts them, by name."""
     awaited = {
         name for process in plan.started for name, what in process.after.items() if what == "done"
     }
@@ -92,16 +90,14 @@ def exported_processes(plan: Plan) -> dict[str, Exported]:
 
 
 def settings_of(dialects: Iterable[Dialect], exported: Exported) -> list[Setting]:
-    """Return what the keys of a process are to another supervisor."""
+    """Return another supervisor's settings for the keys of a process."""
     return [setting for dialect in dialects for setting in dialect.settings(exported)]
 
 
 def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
-    """Return which processes come first here, and what of them is waited for.
+    """Return the processes that start before this one, and the condition on each.
 
-    A strict guard is among them.
-
-    In place of a component comes its container.
+    A strict guard is among them. A component is replaced by its container.
     """
     waits: dict[str, str] = {}
     for name, what in process.after.items():
@@ -119,15 +115,15 @@ def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
 
 
 def waiting_s(process: PlanProcess, what: str) -> float:
-    """Return how many seconds after its start a process is ready, if known; else 0."""
+    """Return the known delay in seconds between a process's start and its readiness, else 0."""
     ready = process.ready
     return ready.number if what == "ready" and ready and ready.kind == "time" else 0.0
 
 
 def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
-    """Return what a supervisor without ROS does not do of the plan, one sentence each.
+    """Return the properties of the plan that a supervisor without ROS loses, a sentence each.
 
-    ``dialects`` are what the keys of a process are to it.
+    ``dialects`` translate the keys of a process for it.
     """
     exported = exported_processes(plan)
     gaps = []
@@ -170,8 +166,7 @@ _SOURCED = (
 def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
     """Return the command that succeeds while the process's first edge is live.
 
-    It looks at one edge, and not at all of them, because each look is a process that joins the
-    robot's domain.
+    It checks only one edge, because each check is a process that joins the robot's domain.
     """
     edge = plan.edges_of(process.name)[0]
     argv = [
@@ -189,7 +184,7 @@ def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
 
 
 def outside_of(plan: Plan, folder: str) -> list[str]:
-    """Return sentences about needs that a container with the plan's folder lacks."""
+    """Return sentences about requirements that a container with the plan's folder lacks."""
     gaps = []
     for process in plan.started:
         outside = [argument for argument in process.texts if "${build_dir}/.." in argument]
@@ -229,17 +224,17 @@ _Dumper.add_representer(str, _string)
 
 
 def yaml_text(value: Mapping[str, Any]) -> str:
-    """Return the value as YAML in blocks, its keys in their order."""
+    """Return the value as block-style YAML, keys in their order."""
     return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000)
 
 
 def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
-    """Return the units, and what they do not keep of the plan.
+    """Return the units, and the properties of the plan that they lose.
 
-    tfcompose's own processes say when they are ready (``Type=notify``), so that ``After=`` waits
-    for that; of others systemd knows that they were executed. One that others wait for until it is
-    done is ``Type=oneshot``. One that is ready so many seconds after its start has only started,
-    for systemd, when a sleep of so many has ended.
+    tfcompose's own processes notify systemd when they are ready (``Type=notify``), so ``After=``
+    waits for that. For other processes systemd only knows that they were executed. A process that
+    others wait for until it is done is ``Type=oneshot``. For a process that is ready a fixed time
+    after its start, systemd considers the start complete after a sleep of that time.
     """
     exported = exported_processes(plan)
     names = {
@@ -354,10 +349,10 @@ _MET = {
 
 
 def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
-    """Return the compose file, and what it does not keep of the plan.
+    """Return the compose file, and the properties of the plan that it loses.
 
     A process that owns edges is healthy while the first of them is live; ``after: ready`` waits
-    for that. One that runs on a host is in the profile of that name, and waits only for what is on
+    for that. A process on a host is in the profile of that name, and waits only for processes on
     the same host.
     """
     names = plain_names(plan)

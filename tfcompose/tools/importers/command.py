@@ -249,9 +249,9 @@ def _import_observed(arguments: Namespace) -> int:
 
 
 def observed_draft(arguments: Namespace, *, is_adopted: bool = False) -> ImportDraft:
-    """Return a draft of what is published, or was recorded.
+    """Return a draft of the published or recorded tree.
 
-    With ``is_adopted`` fixed edges of stock nodes stay with those.
+    With ``is_adopted``, fixed edges of stock nodes stay with those nodes.
     """
     from tfcompose.cli.compiling import library
     from tfcompose.cli.live import observe_topics
@@ -307,7 +307,7 @@ def _ending_of(text: str) -> str:
 
 
 def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: str = "") -> None:
-    """Add what a launch file starts, and the descriptions of its state publishers."""
+    """Add the processes of a launch file, and the descriptions of its state publishers."""
     from tfcompose.cli.compiling import library, print_output, report_missing_confinement
     from tfcompose.cli.reading import read_text
     from tfcompose.tools.importers.launch import add_launch
@@ -337,7 +337,7 @@ def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: 
 
 
 def finish(draft: ImportDraft, arguments: Namespace) -> int:
-    """Write a draft, with what ``lint`` finds in it; return the exit code."""
+    """Write a draft, with lint's findings about it; return the exit code."""
     from dataclasses import replace
 
     from tfcompose.tools.importers.draft import text_with_findings
@@ -400,7 +400,7 @@ def _known_packages(packages: dict[str, str], arguments: Namespace) -> Packages:
 
 
 def check_use(arguments: Namespace) -> None:
-    """Refuse names that cannot be, and a file that is there.
+    """Refuse invalid names, and an output file that exists.
 
     Raises:
         SystemExit: after saying so.

@@ -1,4 +1,4 @@
-"""Command lines: which program they start, and what its ROS arguments say."""
+"""Command lines: the program that they start, and their ROS arguments."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BEFORE = frozenset({"exec", "nohup", "time", "stdbuf", "setsid"})
 
 
 def with_ros_arguments(program: Program) -> Program:
-    """Return the program with what it is a command line of, and with its ROS arguments as keys."""
+    """Return the program of the command line, with its ROS arguments as keys."""
     if program.shell:
         program = _without_shell(program)
     if program.package is None and not program.shell:

@@ -1,9 +1,6 @@
-"""A robot file in the making.
+"""A robot file in the making: sections with entries, comments, and omissions.
 
-Sections with entries, comments at them, and what could not be imported.
-
-Readers of launch files, scripts and running robots fill it in the order of their source; it writes
-the text.
+Readers of launch files, scripts and running robots fill it in source order. It writes the text.
 """
 
 from __future__ import annotations
@@ -102,7 +99,7 @@ class ImportDraft:
     def todo(
         self, message: str, span: Span | None, path: Entry = ("", ""), advice: str = ""
     ) -> None:
-        """Say that something of the source is not imported: in a comment, and as a finding."""
+        """Record something that is not imported, as a comment and as a finding."""
         where = f"{posixpath.basename(span.file)}:{span.line}: " if span and span.file else ""
         self.note(path, f"TODO {where}{message}")
         noted = finding("TF020", message, span, help=advice)
@@ -112,7 +109,7 @@ class ImportDraft:
     def frame(
         self, parent: str, child: str, keys: Mapping[str, Any], span: Span | None, *notes: str
     ) -> bool:
-        """Add a fixed frame, unless there is one of that name; return whether it was added."""
+        """Add a fixed frame unless its name is taken; return whether it was added."""
         frames = self.sections["frames"]
         known = frames.get(child)
         if known is not None:
@@ -125,7 +122,7 @@ class ImportDraft:
         return True
 
     def bring(self, path: str) -> str:
-        """Put a file that the source makes beside the robot file; return its path from there."""
+        """Put a file that the source writes next to the robot file; return its path from there."""
         self.used.add(path)
         base, ending = posixpath.splitext(posixpath.basename(path.rpartition("#")[0] or path))
         for number in itertools.count(1):
@@ -137,24 +134,24 @@ class ImportDraft:
     def process(
         self, wanted: str, keys: Mapping[str, Any], *notes: str, section: str = "processes"
     ) -> str:
-        """Add a process, or a container, under a name that is free, and return that."""
+        """Add a process or a container under a free name, and return the name."""
         name = self.free_name(wanted)
         self.sections[section][name] = dict(keys)
         self.note((section, name), *notes)
         return name
 
     def entry_of(self, process: str) -> Entry:
-        """Return the section of a process that is there, or of a container, with its name."""
+        """Return the section and name of an existing process or container."""
         return ("containers" if process in self.sections["containers"] else "processes", process)
 
     def started_entries(self) -> dict[str, dict[str, Any]]:
-        """Return the containers and processes by their names."""
+        """Return the containers and processes by name."""
         return {**self.sections["containers"], **self.sections["processes"]}
 
     def free_name(self, wanted: str) -> str:
         """Return a name for a process or sensor, made of letters, digits and _.
 
-        A number makes it one of its own.
+        A number makes it unique.
         """
         plain = _NO_NAME.sub("_", wanted).strip("_") or "process"
         plain = plain if plain[0].isalpha() else f"process_{plain}"
@@ -218,9 +215,9 @@ class ImportDraft:
 
 
 def path_from(target: Target, path: str) -> str:
-    """Return a path as the robot file has it.
+    """Return a path in the form of a robot file.
 
-    From its folder, or absolute where they have but the root in common.
+    Relative to its folder, or absolute if they share only the root.
     """
     begin = posixpath.normpath(posixpath.join(target.top, target.folder))
     is_near = posixpath.commonpath([begin, posixpath.join(target.top, path)]) != "/"
@@ -232,7 +229,7 @@ def path_from(target: Target, path: str) -> str:
 
 
 def where(span: Span | None, what: str = "") -> str:
-    """Return the place of a value as a comment has it."""
+    """Return the place of a value in the form of a comment."""
     place = f"{posixpath.basename(span.file)}:{span.line}" if span and span.file else ""
     return ": ".join(part for part in (place, what) if part)
 
@@ -246,8 +243,8 @@ def pose_keys(
 ) -> dict[str, Any]:
     """Return the keys of a pose, nothing for the identity.
 
-    ``rpy`` (rad) are the angles by which the source has the rotation; with ``quaternion`` it has
-    that, and it is kept where no whole degrees are meant.
+    ``rpy`` (rad) are the source's angles. With ``quaternion`` the source has a quaternion, which
+    is kept unless it clearly means whole degrees.
     """
     keys: dict[str, Any] = {"xyz": [value + 0.0 for value in pose.xyz]} if any(pose.xyz) else {}
     if rpy is not None:
@@ -275,9 +272,10 @@ def robot_name(wanted: str) -> str:
 def text_with_findings(
     draft: ImportDraft, lint: Callable[[str], Compiled]
 ) -> tuple[str, Compiled]:
-    """Return the robot file, and what ``lint`` finds in it.
+    """Return the robot file, and lint's findings about it.
 
-    Names and clocks of the source are no errors, and a source without frames gives a robot of one.
+    Names and clocks from the source are not errors. A source without frames gives a robot with
+    one.
     """
     if not any(
         draft.sections[title] for title in ("links", "joints", "frames", "sensors", "parts")

@@ -1,8 +1,8 @@
 """Clearpath's ``robot.yaml`` and Autoware's calibration files, as drafts of robot files.
 
 Clearpath's generator calls a xacro macro of its packages for the platform and for each attachment,
-mount, sensor and manipulator (read in clearpath_common and clearpath_config): so do the parts
-here, under the same names.
+mount, sensor and manipulator (source: clearpath_common and clearpath_config). The parts here do
+the same, under the same names.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ _NUMBERED = re.compile(r"([a-z]+[0-9]+)-")
 
 
 def is_clearpath(source: Source) -> bool:
-    """Return whether it is a robot.yaml of Clearpath's."""
+    """Return whether the data is a robot.yaml of Clearpath."""
     data = source.data
     return isinstance(data.get("serial_number"), str) and bool(
         data.keys() & {"platform", "system", "sensors", "mounts"}
@@ -70,9 +70,9 @@ def is_clearpath(source: Source) -> bool:
 
 
 def is_autoware(source: Source) -> bool:
-    """Return whether it is a calibration of Autoware's.
+    """Return whether the data is a calibration of Autoware.
 
-    Frames below their parents, each with x, y, z and angles.
+    It has frames below their parents, each with x, y, z and angles.
     """
     return bool(source.data) and all(
         isinstance(children, dict)
@@ -125,9 +125,9 @@ def add_vehicles(
 ) -> None:
     """Add calibrations of Autoware's individual parameters, a folder per vehicle.
 
-    The folder of a kit's description has but those of the kit itself. The vehicle stays an
-    argument of the robot file where there are several. ``given`` may choose ``vehicle_id`` and
-    ``sensor_model``, as Autoware's launch files do.
+    The folder of a kit's description has only the kit's own. If there are several vehicles, the
+    vehicle becomes an argument of the robot file. ``given`` may set ``vehicle_id`` and
+    ``sensor_model``, as in Autoware's launch files.
 
     Raises:
         RejectedError: if the folder holds no calibrations, or it is not said of which kit they are
@@ -491,13 +491,13 @@ class _Clearpath:
 
 
 def add_clearpath(draft: ImportDraft, source: Source) -> None:
-    """Add what Clearpath's generator would describe."""
+    """Add the robot that Clearpath's generator would describe."""
     draft.has_unknown_frames = True
     _Clearpath(draft, source).add()
 
 
 def add_kit(draft: ImportDraft, source: Source) -> None:
-    """Add a YAML file that is Clearpath's or Autoware's.
+    """Add a YAML file of Clearpath or Autoware.
 
     Raises:
         RejectedError: if it is neither.

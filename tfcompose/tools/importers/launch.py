@@ -1,6 +1,6 @@
 """Launch files as a draft of a robot file.
 
-Read in a process of their own, and put into the language's words.
+They are read in a separate process and translated into the language's keys.
 """
 
 from __future__ import annotations
@@ -76,9 +76,9 @@ _PUBLISHERS = {
 
 
 def add_launch(draft: ImportDraft, launch: Launch, target: Target) -> list[Description]:
-    """Add what a launch file starts to the draft.
+    """Add the processes of a launch file to the draft.
 
-    Return what its robot_state_publishers are given.
+    Return the descriptions given to its robot_state_publishers.
 
     Raises:
         RejectedError: if it is no launch file, takes too long or too much memory, or needs ROS's

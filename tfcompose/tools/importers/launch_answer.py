@@ -1,4 +1,4 @@
-"""The process that reads a launch file confined, and what it may answer."""
+"""The confined process that reads a launch file, and the schema of its answer."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Launch:
 def has_launch() -> bool:
     """Return whether ROS's launch can be imported.
 
-    Folders of that name are often near launch files, and are not it.
+    Folders named launch are common next to launch files, and do not count.
     """
     specs = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
     return all(spec is not None and spec.origin is not None for spec in specs)
@@ -79,7 +79,7 @@ def reach_of(launch: Launch) -> Reach:
 
 
 def answer_of(launch: Launch, reach: Reach, reader: str) -> dict[str, Any]:
-    """Return the records of a launch file, in order, and what else is said of it.
+    """Return the records of a launch file, in order, and the remarks about it.
 
     ``reader`` is ``launch``, or ``xml`` for launch files of ROS 1.
 

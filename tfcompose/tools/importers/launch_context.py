@@ -1,4 +1,4 @@
-"""Launch's context, with what is recorded beside it.
+"""Launch's context, with the recording.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -27,7 +27,7 @@ _DEEPEST = 30
 
 
 class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[misc]
-    """Launch's context, with what is recorded beside it."""
+    """Launch's context, with the recording."""
 
     def __init__(self, find: Callable[[str, str], str | None], *, every_branch: bool) -> None:
         launch.LaunchContext.__init__(self, noninteractive=True)
@@ -44,17 +44,17 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
 
     @property
     def file(self) -> str:
-        """The launch file that is read."""
+        """The launch file being read."""
         return str(self.get_locals_as_dict().get("current_launch_file_path", ""))
 
     def here(self) -> tuple[str, int]:
-        """Return the file and line that is read now."""
+        """Return the file and line being read."""
         place = here()
         return place if place[0] else self.at
 
     @property
     def variables(self) -> dict[str, str]:
-        """The variables that launch files have set."""
+        """The variables set by launch files."""
         return {
             name: with_package(value)
             for name, value in os.environ.items()
@@ -62,12 +62,12 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
         }
 
     def is_inherited(self, name: str) -> bool:
-        """Return whether a variable is there, as the import was started with it."""
+        """Return whether a variable has the value that the import was started with."""
         return name in os.environ and self._environment.get(name) == os.environ[name]
 
     @contextlib.contextmanager
     def within(self, path: str) -> Iterator[None]:
-        """Let another launch file be the one that is read.
+        """Make another launch file the one being read.
 
         Raises:
             FailedError: if they include each other.
@@ -89,7 +89,7 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
     def visit_later(self, visit: Callable[[], None]) -> None:
         """Let a function visit what launch visits after the launch file.
 
-        The scope and the conditions are those of now, the environment is that of then.
+        It gets the current scope and conditions, but the later environment.
         """
         configurations, names = dict(self.launch_configurations), dict(self.get_locals_as_dict())
         now = {name: copy(getattr(self, name)) for name in _SCOPE}

@@ -1,10 +1,9 @@
-"""Modules that launch files import, in the place of others or of what is not installed.
+"""Modules that launch files import, replaced for the import.
 
-``ament_index_python`` finds packages around the launch file too, xacro and MoveIt keep which files
-they read, and nav2_common changes parameter files without a disk. Modules that are not installed
-give values that do nothing, and are named.
-
-This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
+``ament_index_python`` also finds packages around the launch file, xacro and MoveIt record which
+files they read, and nav2_common changes parameter files without a disk. Modules that are not
+installed give inert values, and are named. This runs in the process that reads launch files
+(``launch_process``), with ROS's own ``launch``.
 """
 
 from __future__ import annotations

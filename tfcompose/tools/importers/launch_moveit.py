@@ -1,7 +1,6 @@
-"""MoveIt's builder of configurations, which reads parameters from a configuration package.
+"""MoveIt's configuration builder, which reads parameters from a configuration package.
 
-What it reads, and under which names it hands it on, was read in MoveIt's sources. Files that are
-not there are named.
+The files and parameter names follow MoveIt's sources. Missing files are named.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ _MONITOR = {
 
 
 class MoveItConfigs:
-    """What was built: mappings of parameters."""
+    """The built configuration: mappings of parameters."""
 
     def __init__(self, package_path: str, parts: dict[str, dict[str, Any]]) -> None:
         self.package_path, self.parts = package_path, parts
@@ -75,7 +74,7 @@ class MoveItConfigs:
 
 
 class MoveItConfigsBuilder:
-    """Builds them; ``find`` locates packages, ``context`` collects what is missing."""
+    """Builds configurations; ``find`` locates packages, ``context`` collects missing files."""
 
     def __init__(
         self,
@@ -118,7 +117,7 @@ class MoveItConfigsBuilder:
     def robot_description_semantic(
         self, file_path: Any = None, mappings: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
-        """Take the robot's groups."""
+        """Take the robot's semantic description (SRDF)."""
         srdf = self._of_setup_assistant("srdf") or f"config/{self._name}.srdf"
         self._parts["robot_description_semantic"] = {
             f"{self._key}_semantic": self._text(file_path or srdf, mappings)
@@ -126,7 +125,7 @@ class MoveItConfigsBuilder:
         return self
 
     def planning_scene_monitor(self, *args: Any, **more: Any) -> MoveItConfigsBuilder:
-        """Take what the monitor of the scene publishes."""
+        """Take the publishing settings of the planning scene monitor."""
         self._parts["planning_scene_monitor"] = {
             **_MONITOR,
             **dict(zip(_MONITOR, args, strict=False)),
@@ -137,7 +136,7 @@ class MoveItConfigsBuilder:
     def trajectory_execution(
         self, file_path: Any = None, moveit_manage_controllers: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
-        """Take the controllers; without a file, those of a file that is named as such."""
+        """Take the controllers; without a file, those of a file named for controllers."""
         names = [
             file.name.removesuffix("_controllers.yaml")
             for file in self._config("*_controllers.yaml")
@@ -153,7 +152,7 @@ class MoveItConfigsBuilder:
         return self
 
     def sensors_3d(self, file_path: Any = None, **_more: Any) -> MoveItConfigsBuilder:
-        """Take sensors of the scene, if there is a file that has some."""
+        """Take the sensors of the planning scene, if a file lists any."""
         known = self._config("sensors_3d.yaml")
         values = self._read(str(file_path or known[0])) if file_path or known else {}
         sensors = values.get("sensors")
@@ -173,7 +172,7 @@ class MoveItConfigsBuilder:
     def planning_pipelines(
         self, default_planning_pipeline: Any = None, pipelines: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
-        """Take the planners; without names, those that have a file in the package."""
+        """Take the planners; without names, those with a file in the package."""
         names = list(pipelines or ())
         if not names:
             names = [
@@ -192,7 +191,7 @@ class MoveItConfigsBuilder:
         return self
 
     def to_moveit_configs(self) -> MoveItConfigs:
-        """Return what was built, with what is usual beside it."""
+        """Return the configuration, with MoveIt's defaults for the rest."""
         for name in _USUAL:
             if name not in self._parts:
                 getattr(self, name)()

@@ -1,4 +1,4 @@
-"""nav2_common's substitutions for launch files, whose parameter files stay off the disk.
+"""nav2_common's substitutions for launch files; their parameter files are not written to disk.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -25,7 +25,7 @@ _TRUE = frozenset({"true", "1", "yes", "on", "y", "t"})
 
 
 class LaunchConfigAsBool(LaunchConfiguration):  # type: ignore[misc]
-    """An argument as True or False, however it is written."""
+    """An argument as True or False, in any spelling."""
 
     def __init__(self, name: Any) -> None:
         super().__init__(name)
@@ -67,7 +67,7 @@ def _texts(values: Mapping[str, Any] | None, context: RecordingContext) -> dict[
 
 
 class ReplaceString(_FromFile):
-    """A file with texts in the place of others."""
+    """A file with texts replaced."""
 
     def __init__(
         self, source_file: Any, replacements: Mapping[str, Any], condition: Any = None
@@ -90,7 +90,7 @@ class ReplaceString(_FromFile):
 
 
 class RewrittenYaml(_FromFile):
-    """A parameter file with other values and keys, or all of it below a namespace.
+    """A parameter file with values and keys rewritten, or moved below a namespace.
 
     A rewrite is named by a key at any depth, or by the whole path with dots.
     """

@@ -1,4 +1,4 @@
-"""Launch's objects, which keep what they were made of, and where.
+"""Launch's objects, with their constructor arguments and places recorded.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -55,7 +55,7 @@ _PLACES: list[tuple[str, int]] = []
 
 
 def attach() -> None:
-    """Let launch's objects keep what they are made of, and their lines."""
+    """Make launch's objects record their arguments and their lines."""
     for kind in _classes():
         if kind.__init__ is not object.__init__:  # type: ignore[misc]
             _keep(kind)
@@ -71,9 +71,9 @@ def attach() -> None:
 
 
 def arguments_of(made: Any) -> Mapping[str, Any]:
-    """Return what an object of launch was made of, by the names of its parameters.
+    """Return an object's constructor arguments, by parameter name.
 
-    Of an object of a derived class, what it hands on to launch's.
+    For an object of a derived class, the arguments that it passes to launch's class.
     """
     if "_made_of" not in vars(made):
         return {}
@@ -89,25 +89,25 @@ def arguments_of(made: Any) -> Mapping[str, Any]:
 
 
 def class_name(made: Any) -> str:
-    """Return the name of the class of launch's that an object is of."""
+    """Return the name of the launch class that an object is an instance of."""
     name: str = vars(made).get("_made_of", (type(made).__name__,))[0]
     return name
 
 
 def place_of(made: Any) -> tuple[str, int]:
-    """Return the file and line at which an object was made."""
+    """Return the file and line that created an object."""
     place: tuple[str, int] = vars(made).get("_made_at", ("", 1))
     return place
 
 
 def id_of(action: Any) -> int:
-    """Return the number that tells an action apart in records."""
+    """Return the number that identifies an action in records."""
     number: int = vars(action).setdefault("_recorded_as", next(IDS))
     return number
 
 
 def reason(error: BaseException) -> str:
-    """Return what an exception says, in one line, with the line of the launch file."""
+    """Return an exception's message on one line, with the line of the launch file."""
     trace, line = error.__traceback__, 0
     while trace is not None:
         if trace.tb_frame.f_globals.get("__name__") == _MODULE:
@@ -118,7 +118,7 @@ def reason(error: BaseException) -> str:
 
 
 def line_of(error: BaseException, path: str) -> int:
-    """Return the line of a file at which an exception stopped it, 0 where that is unknown."""
+    """Return the line of a file at which an exception stopped it, 0 if unknown."""
     if isinstance(error, ET.ParseError):
         return int(error.position[0])
     if mark := getattr(error, "problem_mark", None):
@@ -133,7 +133,7 @@ def line_of(error: BaseException, path: str) -> int:
 
 
 def here() -> tuple[str, int]:
-    """Return the file and line of the launch file that is being run or parsed, or no file."""
+    """Return the file and line of the launch file being run or parsed, or no file."""
     frame: Any = sys._getframe(1)  # noqa: SLF001 (CPython's only way)
     while frame is not None and frame.f_globals.get("__name__") != _MODULE:
         frame = frame.f_back
@@ -144,7 +144,7 @@ def here() -> tuple[str, int]:
 
 @contextlib.contextmanager
 def parsing(path: str) -> Iterator[None]:
-    """Let what is made meanwhile have its place in a file that is parsed."""
+    """Give objects made meanwhile their places in a file that is being parsed."""
     _PLACES.append((path, 1))
     try:
         yield

@@ -88,7 +88,7 @@ def optional_text(value: Any, context: RecordingContext) -> str | None:
 def keep_text(value: Any, context: RecordingContext, *, typed: bool = False) -> str:
     """Return a value's text, with launch arguments as references.
 
-    ``typed``: where an argument is all of it, it may be 10.0, which texts lose.
+    ``typed``: if an argument is the whole value it may be 10.0, which texts lose.
     """
     return with_package(with_files(Text.of(_parts(value, context, typed=typed))))
 

@@ -1,10 +1,9 @@
-"""Reads launch files in a confined process of its own: a launch file is a program.
+"""Reads launch files in a separate confined process, because a launch file is a program.
 
-ROS's own ``launch`` reads it, and a reader of this package those of ROS 1.
-
-It has no network, and cannot start programs, write files or signal others, and reads only what it
-is told: the kernel refuses all else (``sandbox``), and a hook of Python's names what a launch file
-tries of it.
+ROS's own ``launch`` reads it; this package has a reader for those of ROS 1. The process has no
+network, cannot start programs, write files or signal others, and reads only permitted files: the
+kernel refuses everything else (``sandbox``), and an audit hook of Python names what a launch file
+attempts.
 """
 
 from __future__ import annotations
@@ -94,7 +93,7 @@ _TOOLS = {"xacro"}
 class LaunchPackages:
     """Finds packages: named and installed ones, and those around the launch file.
 
-    ``recording`` is told of those that are not found.
+    It reports missing ones to ``recording``.
     """
 
     def __init__(self, packages: dict[str, str], prefixes: list[str]) -> None:
@@ -232,9 +231,9 @@ def _watch(  # noqa: C901 (one hook after another)
 
 
 def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dict[str, Any]:
-    """Return what came of reading a launch file.
+    """Return the result of reading a launch file.
 
-    Records, in order, and why and at which line it stopped if it did.
+    Records, in order, and if reading stopped, the reason and the line.
     """
     packages = LaunchPackages(request["packages"], request["prefixes"])
     stopped, line = "", 0

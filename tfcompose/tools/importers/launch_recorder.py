@@ -1,10 +1,8 @@
 """Records what ROS's own ``launch`` would start, without starting anything.
 
-Launch parses the file, checks what its actions are given, and evaluates its substitutions,
-conditions and groups, those of other packages included. An action that would start something is
-recorded when it is visited.
-
-This runs in the process that reads launch files (``launch_process``).
+Launch parses the file, checks the arguments of its actions, and evaluates its substitutions,
+conditions and groups, including those of other packages. Visiting an action that would start
+something records it. This runs in the process that reads launch files (``launch_process``).
 """
 
 from __future__ import annotations
@@ -64,9 +62,9 @@ from tfcompose.tools.importers.texts import Text, argument_of
 
 
 def attach() -> None:
-    """Let launch record instead of starting anything.
+    """Make launch record instead of starting anything.
 
-    Nothing is logged: launch would make a folder for its log, which it may not.
+    Nothing is logged, because launch would make a folder for its log, which the sandbox forbids.
     """
     config = launch.logging.launch_config
     config.log_dir = tempfile.gettempdir()
@@ -166,7 +164,7 @@ def _note_decisions(kind: Any) -> None:
 
 
 def visit_all(entities: Any, context: RecordingContext) -> None:
-    """Visit what launch would visit, in order."""
+    """Visit everything that launch would visit, in order."""
     if entities is None:
         return
     for entity in entities if isinstance(entities, (list, tuple)) else [entities]:
@@ -241,7 +239,7 @@ def _let_launch(action: Any, context: RecordingContext) -> None:
 
 
 def describe_action(made: Any) -> str:
-    """Return what an action is, for people."""
+    """Return a description of an action, for display."""
     for kind, describe_it in _DESCRIBED:
         if isinstance(made, kind):
             return describe_it(arguments_of(made))
@@ -507,7 +505,7 @@ def _set_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
 
 
 def include(path: str, context: RecordingContext) -> None:
-    """Visit what a launch file describes; behind the outermost one what comes later.
+    """Visit a launch file's description; after the outermost one, the delayed visits.
 
     Raises:
         FailedError: if launch refuses it.

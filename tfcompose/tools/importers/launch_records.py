@@ -1,4 +1,4 @@
-"""Records of what launch files start, whichever reader makes them.
+"""Records of the processes that launch files start, the same for each reader.
 
 This runs in the process that reads launch files (``launch_process``).
 """
@@ -24,9 +24,9 @@ IDS = itertools.count(1)
 
 
 class FailedError(Exception):
-    """Something of a launch file cannot be resolved.
+    """A part of a launch file cannot be resolved.
 
-    ``line`` is set where it is about a whole file, else 0.
+    ``line`` is set if the error is about a whole file, else 0.
     """
 
     def __init__(self, reason: str, line: int = 0) -> None:
@@ -35,9 +35,9 @@ class FailedError(Exception):
 
 
 class LaunchRecording:
-    """What a launch file starts, as far as it is read.
+    """The resolved contents of a launch file.
 
-    ``records`` is what came of it, in order.
+    ``records`` has them in order.
     """
 
     def __init__(
@@ -60,17 +60,17 @@ class LaunchRecording:
         self.files: dict[str, str] = {}
 
     def here(self) -> tuple[str, int]:
-        """Return the file and line that is read now."""
+        """Return the file and line being read."""
         return self.at
 
     def record(self, kind: str, at: Any, **what: Any) -> None:
-        """Keep what an action does."""
+        """Record an action."""
         more: dict[str, Any] = {"when": list(self.conditions)} if self.conditions else {}
         more |= {"only_when": " and ".join(dict.fromkeys(self.whens))} if self.whens else {}
         self.records.append({"kind": kind, "at": at, **more, **what})
 
     def file_of_text(self, source: str, text: str) -> str:
-        """Keep the text that launch makes of a file; return the path that stands for it."""
+        """Keep the text of a file that launch writes; return its placeholder path."""
         source = os.path.abspath(source)  # noqa: PTH100 (links stay)
         begin = source.rpartition("#")[0] if source in self.files else source
         for number in itertools.count(1):
@@ -80,19 +80,20 @@ class LaunchRecording:
         raise AssertionError
 
     def todo(self, at: Any, text: str) -> None:
-        """Say what of a launch file is not resolved."""
+        """Record a part of a launch file that is not resolved."""
         self.record("todo", at, text=shown(text))
 
     def declare(self, name: str, value: str) -> None:
-        """Take an argument's value as one that the robot file may have as its own."""
+        """Register an argument that the robot file may declare too."""
         kinds = {bool: "bool", int: "int", float: "float", str: "string"}
         if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
             self.declared[name] = kinds[type(scalar_of(value))]
 
     def argument_kept(self, name: str, value: str, *, typed: bool = False) -> bool:
-        """Return whether an argument's value can stand for itself.
+        """Return whether a reference to the argument can replace its value.
 
-        Otherwise it is written down, and decides. ``typed``: it may be 10.0, which texts lose.
+        Otherwise the value is written, and it is fixed. ``typed``: it may be 10.0, which texts
+        lose.
         """
         if name not in self.declared:
             return False
@@ -107,7 +108,7 @@ class LaunchRecording:
 
 
 def scalar_of(text: str) -> Any:
-    """Return what a launch argument is: true or false, a number as it is written, or the text."""
+    """Return a launch argument's value: a bool, a number as written, or the text."""
     if text.lower() in {"true", "false"}:
         return text.lower() == "true"
     if re.fullmatch(r"-?(0|[1-9][0-9]{0,15})", text) and text != "-0":
@@ -118,7 +119,7 @@ def scalar_of(text: str) -> Any:
 
 
 def conjunction(parts: Iterable[str | None], separator: str) -> str | None:
-    """Return conditions of a robot file as one, or None where one of them cannot be written."""
+    """Return the conjunction of conditions of a robot file, None if one cannot be expressed."""
     conditions = list(parts)
     if not all(conditions):
         return None
@@ -132,14 +133,14 @@ _PLACEHOLDER = re.compile(r'(<robot name="tfcompose_text_\d+"/>)')
 
 
 def placeholder(file: str, args: dict[str, str] | None = None) -> str:
-    """Return a description that a launch file can carry about in the place of a file's text."""
+    """Return a description that a launch file can pass on instead of a file's text."""
     text = f'<robot name="tfcompose_text_{len(_FILES)}"/>'
     _FILES[text] = FileText(with_package(file), args or {})
     return text
 
 
 def with_files(text: str) -> str:
-    """Return a text with the files for which placeholders stand in it, as parts."""
+    """Return a text with the placeholders in it replaced by their files, as parts."""
     return Text.of(part for known in parts_of(text) for part in _split(known))
 
 
@@ -150,12 +151,12 @@ def _split(part: Part) -> Iterable[Part]:
 
 
 def shown(text: str) -> str:
-    """Return a text for people, with the names of files for their texts."""
+    """Return a text for display, with the names of files instead of their texts."""
     return str(with_files(text))
 
 
 def jsonable(value: Any) -> Any:
-    """Return a record's value as JSON has it."""
+    """Return a record's value as JSON data."""
     if isinstance(value, str):
         return as_json(with_files(value))
     if isinstance(value, dict):
@@ -169,9 +170,9 @@ def jsonable(value: Any) -> Any:
 
 
 def with_package(path: str) -> str:
-    """Return a path below a package that is not found as an address.
+    """Return a path below a missing package as an address.
 
-    Pathlib takes one slash for two.
+    pathlib reduces two slashes to one.
     """
     if "package:/" not in path or isinstance(path, Text):
         return path
@@ -179,7 +180,7 @@ def with_package(path: str) -> str:
 
 
 def of_command(argv: list[str], text: str) -> str:
-    """Return what stands for the output of a command that makes a robot's description.
+    """Return the placeholder for the output of a command that makes a robot's description.
 
     Raises:
         FailedError: for any other command: none is run.
@@ -200,7 +201,7 @@ def of_command(argv: list[str], text: str) -> str:
 
 
 def file_text(path: str) -> str:
-    """Return the text of a file, or what stands for it where its package is not found."""
+    """Return the text of a file, or a placeholder if its package is not found."""
     if path.startswith(PACKAGE):
         return placeholder(path)
     try:
@@ -210,5 +211,5 @@ def file_text(path: str) -> str:
 
 
 def relative(text: str) -> str:
-    """Return a path for people, from the folder of the import."""
+    """Return a path for display, relative to the folder of the import."""
     return os.path.relpath(text) if os.path.isabs(text) and os.path.exists(text) else text  # noqa: PTH110, PTH117

@@ -1,7 +1,7 @@
-"""Launch files that need no launch: roslaunch's XML, of ROS 1, and lines of static transforms.
+"""Launch files that need no launch: ROS 1's roslaunch XML, and lines of static transforms.
 
-What its elements and substitutions do was read in roslaunch's and rosparam's documentation. This
-runs in the process that reads launch files (``launch_process``): ``$(eval …)`` is Python.
+Elements and substitutions follow the documentation of roslaunch and rosparam. This runs in the
+process that reads launch files (``launch_process``): ``$(eval …)`` is Python.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _OF_ROS1 = re.compile(r"\$\((arg|find|optenv)\s")
 
 
 class Ros1Recording(LaunchRecording):
-    """What is recorded of a launch file of ROS 1, and the scope that its elements change."""
+    """The recording of a ROS 1 launch file, and the scope that its elements change."""
 
     def __init__(
         self, find: Callable[[str, str], str | None], *, every_branch: bool = False
@@ -66,7 +66,7 @@ class Ros1Recording(LaunchRecording):
         self.file = ""
 
     def scope(self) -> dict[str, Any]:
-        """Return what a group restores at its end."""
+        """Return the state that a group restores at its end."""
         return {
             "variables": dict(self.variables),
             "namespace": self.namespace,
@@ -75,7 +75,7 @@ class Ros1Recording(LaunchRecording):
         }
 
     def restore(self, scope: dict[str, Any]) -> None:
-        """Take back what was changed in a group, or an included file."""
+        """Undo the changes of a group or an included file."""
         vars(self).update(scope)
 
 
@@ -86,7 +86,7 @@ def is_of_ros1(text: str, file: str) -> bool:
 
 
 def has_only_transforms(text: str, file: str) -> bool:
-    """Return whether a launch file in XML is lines of static_transform_publisher, and no more."""
+    """Return whether a launch file in XML has only static_transform_publisher lines."""
     root = _launch_in(text, file)
     return root is not None and bool(root.children) and all(map(_is_transform, root.children))
 
@@ -121,7 +121,7 @@ def _says_ros1(element: Element) -> bool:
 
 
 def read(file: str, recording: Ros1Recording) -> None:
-    """Record what a launch file starts.
+    """Record the processes of a launch file.
 
     Raises:
         FailedError: if it is none, or includes itself.

@@ -1,4 +1,4 @@
-"""Files that a launch file writes when it is started: texts, which the import brings along.
+"""Files that a launch file writes when it starts: texts, which the import takes along.
 
 Nothing reaches the disk.
 """
@@ -23,10 +23,10 @@ _write = os.write
 
 
 class SavedFiles:
-    """What a launch file has written, by path.
+    """The files that a launch file has written, by path.
 
-    It reads its files back as others, and those that launch makes. ``finish`` says what else it
-    would have made: folders without such a file, and temporary names without one.
+    It can read them back like others, and also those that launch writes. ``finish`` reports the
+    rest: folders without such a file, and temporary names that were not used.
     """
 
     def __init__(self, recording: LaunchRecording, null: int) -> None:
@@ -39,7 +39,7 @@ class SavedFiles:
         self._temporary: dict[str, tuple[str, int]] = {}
 
     def open(self, file: str | int, mode: str) -> Any | None:
-        """Return a file as ``open`` does, or None where it is to be opened on the disk."""
+        """Return a file as ``open`` does, or None if it is to be opened on the disk."""
         name = self._descriptors.get(file) if isinstance(file, int) else file
         if name is None:
             return None
@@ -108,12 +108,12 @@ class SavedFiles:
         return f"{folder or tempfile.gettempdir()}/{prefix or 'tmp'}{number}{suffix or ''}"
 
     def folder(self, path: Any, *_args: Any, **_more: Any) -> None:
-        """Note that a folder would be made."""
+        """Record that a folder would be made."""
         name = os.path.abspath(os.fsdecode(path))  # noqa: PTH100 (links stay)
         self._folders.setdefault(name, self._recording.here())
 
     def finish(self) -> None:
-        """Say what else would have been made."""
+        """Report the other things that would have been made."""
         for path, at in self._folders.items():
             if not any(PurePath(file).is_relative_to(path) for file in self.texts):
                 self._recording.todo(at, f"the folder {path} would be made: not done")

@@ -1,4 +1,4 @@
-"""Parameters of a node, as a robot file has them."""
+"""Parameters of a node in the form of a robot file."""
 
 from __future__ import annotations
 
@@ -37,10 +37,7 @@ MOST_BYTES = 16_000_000
 
 
 def node_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft) -> str | None:
-    """Return the node that parameter files are written for, where that is one alone.
-
-    None where none is named.
-    """
+    """Return the only node that parameter files are written for, None otherwise."""
     files = [file for file in params if isinstance(file, str)]
     nodes = [node.name for file in files for node in _nodes_in(file, draft) or ()]
     names = {node.rpartition("/")[2] for node in nodes if "*" not in node}
@@ -69,10 +66,10 @@ def params_of(
 ) -> ImportedParams:
     """Return the parameters of a node.
 
-    rcl keeps sections in the order in which their names come first, and of several for a node the
-    last one counts; launch itself gives a component one after the other. A robot file's own
-    parameters count before those of its files: it has those that its files alone do not give.
-    Where a node ``keeps_name``, they are for every node of the process.
+    rcl keeps sections in the order in which their names first appear, and of several sections for
+    a node the last one wins. launch itself passes parameters to a component one by one. A robot
+    file's inline parameters override those of its files, so only parameters that the files alone
+    do not give are inline. If a node ``keeps_name``, they apply to every node of the process.
     """
     files: list[str] = []
     left = []
@@ -135,7 +132,7 @@ def _file_parameter(params: dict[str, Any]) -> list[str]:
 
 
 def bring_files(value: Any, draft: ImportDraft) -> Any:
-    """Return a text with the path of a file that the source makes at its end as ours."""
+    """Return a text, with a generated file's path at its end replaced by the brought file's."""
     if isinstance(value, list):
         return [bring_files(item, draft) for item in value]
     made = next((path for path in draft.made if str(value).endswith(path)), None)
@@ -155,7 +152,7 @@ def _that_count(sections: _Sections, node: str) -> dict[str, Any]:
 
 
 def value_in(value: Any) -> Any:
-    """Return a parameter's value, also where it is words of a file."""
+    """Return a parameter's value, also if it is text from a file."""
     if isinstance(value, list):
         return list(map(value_in, value))
     if isinstance(value, Word):

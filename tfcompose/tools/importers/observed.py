@@ -1,7 +1,4 @@
-"""A tree that was observed, live or in a bag, as a draft.
-
-What is published, by which nodes, how often.
-"""
+"""An observed tree, live or from a bag, as a draft: edges, their nodes and rates."""
 
 from __future__ import annotations
 
@@ -92,7 +89,10 @@ class Observed:
         return len(edge.nodes) == 1 and edge.nodes[0] in {below + STATIC, below + STATE_PUBLISHER}
 
     def recognise(self, library: Library) -> None:
-        """Replace fixed frames by sensors whose presets have them, with one driver at most."""
+        """Replace fixed frames with sensors whose presets describe them.
+
+        All driver frames of a sensor must have the same owner, and its other frames none.
+        """
         frames = self.draft.sections["frames"]
         for publisher in (DRIVER, TFCOMPOSE):
             sensors, undecided = recognise(self._fixed_frames(), library, publisher)
@@ -252,9 +252,9 @@ def _parents_first(edges: Sequence[EdgeState]) -> list[EdgeState]:
 
 
 def round_rate(rate_hz: float | None) -> float | None:
-    """Return the rate (Hz) that was meant by one that was measured.
+    """Return the probable nominal rate (Hz) for a measured one.
 
-    A round one near it, or what is surely reached.
+    A round rate near it, or one that is surely reached.
     """
     if not rate_hz or not math.isfinite(rate_hz) or rate_hz <= 0:
         return None
@@ -268,9 +268,7 @@ def round_rate(rate_hz: float | None) -> float | None:
 def parse_command_line(argv: Sequence[str]) -> dict[str, Any]:
     """Return the package, executable and arguments of a command line.
 
-    Nothing where it is no package's program.
-
-    A program of a Python package has the interpreter in front.
+    Empty if it runs no package's program. A Python package's program follows its interpreter.
     """
     rest = list(argv)
     if rest and posixpath.basename(rest[0]).startswith("python") and rest[1:]:

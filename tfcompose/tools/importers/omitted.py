@@ -1,4 +1,4 @@
-"""Parts of a URDF that a robot file cannot hold: left out or changed, with a note."""
+"""Parts of a URDF that a robot file cannot hold: omitted or changed, with a note."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ _MATERIAL = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def omitted_notes(document: Document) -> Notes:
-    """Return what is left out of each link and joint, by reading or by import.
+    """Return what reading or import omits, by link and joint.
 
-    Of the robot itself under no name.
+    Notes about the robot itself have an empty name.
     """
     notes: Notes = {}
     entries: list[tuple[Span, Entry]] = []
@@ -137,7 +137,7 @@ def _elements_in(element: Element) -> Iterator[Element]:
 
 
 def angles(root: Element) -> dict[Quaternion, Vector]:
-    """Return each origin's roll, pitch and yaw (rad) from the source, by rotation."""
+    """Return each origin's roll, pitch and yaw (rad) in the source, by rotation."""
     rpy: dict[Quaternion, Vector] = {}
     for top in root.children:
         for element in _elements_in(top) if top.tag in {"link", "joint"} else ():
@@ -177,9 +177,9 @@ def _name(element: Element) -> str:
 
 
 def with_material_names(robot: Robot) -> tuple[Robot, list[str]]:
-    """Return the robot with plain material names, and what each was called.
+    """Return the robot with plain material names, and the original name of each.
 
-    Parts of colours beyond 0 to 1 are taken as the nearest that there is, and that is noted too.
+    Colour components outside 0 to 1 are clamped, with a note.
     """
     names: dict[str, str] = {}
     notes: list[str] = []

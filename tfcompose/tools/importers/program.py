@@ -1,4 +1,4 @@
-"""A program that a script or a launch file starts, as the source has it."""
+"""A program that a script or a launch file starts, in the source's terms."""
 
 from __future__ import annotations
 

@@ -51,10 +51,10 @@ _JOINTS_HZ = 10.0
 
 
 def add_program(draft: ImportDraft, program: Program, target: Target) -> str | None:
-    """Add a program to the draft; return the name of its process, or None where it is none.
+    """Add a program to the draft; return the name of its process, None if it is not a process.
 
-    A robot_state_publisher is not added here: its description makes links or a part, which
-    ``descriptions`` does.
+    A robot_state_publisher is not added here: ``descriptions`` makes links or a part of its
+    description.
     """
     program = with_ros_arguments(program)
     if program.executable == PROGRAM:
@@ -231,9 +231,9 @@ def _keeps_its_name(program: Program) -> bool:
 
 
 def remappings(rules: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """Return remappings as a robot file has them.
+    """Return remappings in the form of a robot file.
 
-    ROS takes the first of several rules for one name.
+    ROS uses the first of several rules for one name.
     """
     return dict(reversed(list(dict(reversed(rules)).items())))
 

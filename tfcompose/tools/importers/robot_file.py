@@ -1,7 +1,6 @@
 """The text of the robot file of an imported robot.
 
-Its sections and keys are in the order of the language; what could not be imported is noted in
-comments, at its place.
+Sections and keys are in the language's order. Comments note omissions at their places.
 """
 
 from __future__ import annotations
@@ -70,7 +69,7 @@ def robot_file(imported: Imported, head: Iterable[str]) -> str:
 
 
 def put_into(draft: ImportDraft, imported: Imported) -> None:
-    """Put what was imported of a description into the draft of a robot that is more than that."""
+    """Put an imported description into the draft of a larger robot."""
     writer = _Writer(imported)
     for title, entries in writer.sections().items():
         draft.sections[title].update(entries)
@@ -232,9 +231,8 @@ def sensor_keys(
 ) -> dict[str, Any]:
     """Return the keys of a sensor.
 
-    ``pose`` are those of its mount, ``rpy`` the angles of rotations in the source.
-
-    ``driver`` is the process that publishes the frames inside of it, empty where tfcompose does.
+    ``pose`` are those of its mount, ``rpy`` the source's angles of rotations. ``driver`` is the
+    process that publishes its inner frames, empty if tfcompose does.
     """
     frames: dict[str, Any] = {}
     mount = sensor.mount.child
@@ -319,10 +317,10 @@ def import_document(
     packages: Mapping[str, str],
     library: Library | None,
 ) -> Imported:
-    """Return what a robot file at the target holds of the document.
+    """Return the robot file's contents for the document, for a file at the target.
 
-    An empty ``name`` is the source's; ``packages`` are the folders of packages that are not
-    installed. Sensors are looked for in the ``library``, if there is one.
+    If ``name`` is empty, the source's is used. ``packages`` are the folders of packages that are
+    not installed. Sensors are recognised with the ``library``, if there is one.
     """
     robot, unused = without_unused_blocks(with_hardware(document.robot))
     robot, renamed = with_material_names(robot)
@@ -350,8 +348,7 @@ def with_findings(
 ) -> tuple[str, list[Finding]]:
     """Return the robot file with lint's findings as comments, and its own errors.
 
-    ``source`` is the file that the robot was imported from. Names that the source has are no
-    errors.
+    ``source`` is the imported file. Names from the source are not errors.
     """
     head = [f"imported from {posixpath.basename(source)} by tfcompose"]
     compiled = lint(robot_file(robot, head))

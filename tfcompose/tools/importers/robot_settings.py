@@ -1,4 +1,4 @@
-"""Settings of the robot that a source gives each program: clock, namespace, domain."""
+"""Settings that a source gives each program, as the robot's: clock, namespace, domain."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ def _takes_settings(run: Any) -> bool:
 
 
 def is_setting(draft: ImportDraft, name: str, value: str) -> bool:
-    """Return whether a variable is a setting of the whole robot, which then has it.
+    """Return whether a variable is a robot-wide setting, and if so, set it on the robot.
 
-    The first value counts.
+    The first value wins.
     """
     if name not in _SETTINGS:
         return False
@@ -80,7 +80,7 @@ def is_setting(draft: ImportDraft, name: str, value: str) -> bool:
 
 
 def is_isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | None) -> bool:
-    """Return whether remappings keep TF, or move it below the draft's namespace."""
+    """Return whether remappings leave TF unchanged, or move it below the draft's namespace."""
     new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
     if any(name != topic.strip("/") for topic, name in new.items()):
         return False
@@ -94,7 +94,7 @@ def is_isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | N
 
 
 def one_namespace(draft: ImportDraft) -> None:
-    """Give namespaces as the robot's has them below it, and absolute where they are elsewhere."""
+    """Rewrite namespaces relative to the robot's if they are below it, else as absolute."""
     ros = draft.sections["ros"]
     space = ros.get("namespace")
     if not space:

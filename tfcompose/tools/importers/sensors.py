@@ -1,10 +1,9 @@
-"""Sensors in a URDF: chains of fixed frames whose names and poses are those of a preset.
+"""Sensors in a URDF: chains of fixed frames with the names and poses of a preset.
 
-A preset is recognised by frames inside of it: by one at least whose position, which is not 0, is
-the vendor's. Where the frames have other names, the model's must be in one of these or in a
-mesh's, too. Where several presets fit equally well, a generic one is taken, or the one whose model
-is named there; else none is, and a note asks which it is, as it does where there is no more than a
-vendor's name.
+At least one inner frame identifies a preset: its position is the vendor's and not 0. If frames
+have other names, a frame or mesh name must contain the model's name as well. If several presets
+fit equally well, the generic one is used, or the one whose model is named. Otherwise none is used,
+and a note asks which it is, as it does if only a vendor's name was found.
 """
 
 from __future__ import annotations
@@ -108,9 +107,9 @@ class _FrameMatch:
 def recognise(
     robot: Robot, library: Library, publisher: str = TFCOMPOSE
 ) -> tuple[list[Recognised], dict[str, str]]:
-    """Return the sensors, and a note for each mount where none was decided on.
+    """Return the sensors, and a note for each undecided mount.
 
-    ``publisher`` says whether frames are looked for as tfcompose publishes them, or as drivers do.
+    ``publisher``: look for frames as tfcompose publishes them, or as drivers do.
     """
     search = _Search(robot, library, publisher)
     fits = sorted(search.fits(), key=lambda fit: fit.quality, reverse=True)

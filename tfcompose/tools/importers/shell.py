@@ -1,9 +1,7 @@
-"""Commands in a shell script, or in lines of a terminal.
+"""Commands in a shell script, or in lines of a terminal, as far as they need no shell.
 
-What they start, as far as no shell has to run for it.
-
-Words are split as a POSIX shell does; variables that the script sets to plain texts are filled in.
-What only a shell can know, as ``$(…)`` and arithmetic, is not guessed.
+Words are split as in a POSIX shell. Variables that the script sets to plain texts are filled in.
+Anything that only a shell can evaluate, such as ``$(…)`` and arithmetic, is not guessed.
 """
 
 from __future__ import annotations
@@ -458,7 +456,7 @@ def _without_redirections(argv: list[str]) -> list[str]:
 
 
 def add_script(draft: ImportDraft, text: str, file: str, target: Target) -> None:
-    """Add what the commands of a script start to the draft.
+    """Add the programs that a script starts to the draft.
 
     Raises:
         RejectedError: if it is no script by its name or first line, and nothing of ROS stands in

@@ -1,7 +1,7 @@
-"""Arguments of ``static_transform_publisher``: by name or in order in ROS 2, in order in ROS 1.
+"""Arguments of ``static_transform_publisher``: named or positional in ROS 2, positional in ROS 1.
 
-Read in geometry2 (``static_transform_broadcaster_program.cpp``) and in ROS 1's ``tf`` and
-``tf2_ros``: all orders have yaw first, all angles are radians about fixed axes, and nothing is
+Source: geometry2 (``static_transform_broadcaster_program.cpp``) and ROS 1's ``tf`` and
+``tf2_ros``. All orders have yaw first, all angles are radians about fixed axes, and nothing is
 normalised.
 """
 
@@ -45,7 +45,7 @@ _LARGEST_RAD = 1e9
 
 
 class ArgumentsRefusedError(ValueError):
-    """The program would refuse these arguments, or every listener what it then sends."""
+    """The program would refuse these arguments, or listeners the resulting transform."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class StaticTransform:
 
 
 def static_transform(argv: Sequence[str], reader: Reader = "ros2") -> StaticTransform:
-    """Return what the program's own arguments say, without those behind ``--ros-args``.
+    """Return the transform from the program's own arguments, without ``--ros-args``.
 
     Raises:
         RefusedError: if it would refuse them.
@@ -95,7 +95,7 @@ def static_transform(argv: Sequence[str], reader: Reader = "ros2") -> StaticTran
 
 
 def static_words(params: Sequence[Any]) -> list[str]:
-    """Return the arguments that say what the component is told by parameters."""
+    """Return the arguments that are equivalent to the component's parameters."""
     options: dict[str, Any] = {}
     for param_set in params:
         options |= param_set if isinstance(param_set, dict) else {}
@@ -215,9 +215,9 @@ def _number(text: str, what: str) -> float:
 
 
 def reader_of(argv: Sequence[str]) -> Reader:
-    """Return who reads the arguments of a program whose package is not given.
+    """Return which program reads the arguments if the package is not given.
 
-    Tf's have a period behind two frames.
+    tf's version has a period after two frames.
     """
     own = _without_ros_arguments(argv)
     return (

@@ -1,6 +1,6 @@
-"""Texts of which some parts are known only when the robot is built.
+"""Texts with parts that are known only when the robot is built.
 
-A launch argument may have another value then, and the text of a file is not read here.
+A launch argument may have another value then, and a file's text is not read here.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An argument of the robot file, and the value that it has in the source."""
+    """An argument of the robot file, and its value in the source."""
 
     name: str
     value: str
@@ -21,7 +21,7 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class FileText:
-    """The text of a file, or what xacro makes of it with arguments."""
+    """The text of a file, or its expansion by xacro with arguments."""
 
     file: str
     args: Mapping[str, str] = field(default_factory=dict)
@@ -29,7 +29,7 @@ class FileText:
 
 @dataclass(frozen=True, slots=True)
 class MadeFile:
-    """The path of a file that is brought along, seen from the robot file."""
+    """The path, relative to the robot file, of a file that is brought along."""
 
     file: str
 
@@ -38,9 +38,9 @@ Part = str | Argument | FileText | MadeFile
 
 
 class Text(str):
-    """A text with arguments or files' texts in it.
+    """A text that contains arguments or files' texts.
 
-    To everything that reads a ``str`` an argument is its value, and a file's text the file's name.
+    For code that reads a ``str``, an argument is its value, and a file's text is the file's name.
     """
 
     __slots__ = ("parts",)
@@ -48,7 +48,7 @@ class Text(str):
 
     @staticmethod
     def of(parts: Iterable[Part]) -> str:
-        """Return the text of these parts, a plain one where they are all known."""
+        """Return the text of these parts, a plain one if all are known."""
         merged: list[Part] = []
         for part in parts:
             if isinstance(part, str) and merged and isinstance(merged[-1], str):
@@ -73,12 +73,12 @@ def _value(part: Part) -> str:
 
 
 def parts_of(text: str) -> tuple[Part, ...]:
-    """Return the parts of a text; a plain one is a part itself."""
+    """Return the parts of a text; a plain text is its only part."""
     return text.parts if isinstance(text, Text) else (text,)
 
 
 def fill(text: str, kind: type[Argument | FileText]) -> str:
-    """Return a text with arguments, or files' texts, as what they are in a plain ``str``."""
+    """Return a text with its arguments, or its files' texts, replaced by their plain ``str``."""
     return Text.of(_fill(part, kind) for part in parts_of(text))
 
 
@@ -87,7 +87,7 @@ def _fill(part: Part, kind: type[Argument | FileText]) -> Part:
 
 
 def concatenate(texts: Iterable[str], separator: str = "") -> str:
-    """Return texts as one, with a separator between them."""
+    """Return the texts joined by a separator."""
     parts: list[Part] = []
     for index, text in enumerate(texts):
         parts += [separator] if index else []
@@ -96,7 +96,7 @@ def concatenate(texts: Iterable[str], separator: str = "") -> str:
 
 
 def partition(text: str, separator: str) -> tuple[str, str, str]:
-    """Return what is before a separator, the separator, and what follows, as ``str.partition``."""
+    """Return the text before a separator, the separator, and the rest, as ``str.partition``."""
     parts = parts_of(text)
     for index, part in enumerate(parts):
         if isinstance(part, str) and separator in part:
@@ -107,9 +107,9 @@ def partition(text: str, separator: str) -> tuple[str, str, str]:
 
 
 def words_of(text: str) -> list[str]:
-    """Return the words of a command line, whose quotes are a shell's.
+    """Return the words of a command line with shell quotes.
 
-    An argument is within a word, whatever its value.
+    An argument is within a word, whatever its value is.
     """
     fields: list[list[Part]] = []
     quote, is_open, is_escaped = "", False, False
@@ -139,7 +139,7 @@ def _characters(text: str) -> Iterator[Part]:
 
 
 def argument_of(text: Any) -> Argument | None:
-    """Return the argument that is all of a text."""
+    """Return the argument that makes up the whole text."""
     match text:
         case Text(parts=(Argument() as argument,)):
             return argument
@@ -179,7 +179,7 @@ SHAPE: tuple[Any, ...] = (
 
 
 def as_json(text: str) -> Any:
-    """Return a text as JSON has it."""
+    """Return a text as JSON data."""
     if not isinstance(text, Text):
         return text
     return {"parts": list(map(_part_as_json, text.parts))}
@@ -195,7 +195,7 @@ def _part_as_json(part: Part) -> Any:
 
 
 def from_json(value: Any) -> Any:
-    """Return the text that JSON has, which fits ``SHAPE``; other values are what they are."""
+    """Return the text for JSON data that fits ``SHAPE``; other values are unchanged."""
     if isinstance(value, dict):
         return Text.of(map(_part_from_json, value["parts"]))
     return value

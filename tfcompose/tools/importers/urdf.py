@@ -1,4 +1,4 @@
-"""Import of a robot_state_publisher's description: a xacro file as a part, a URDF as links."""
+"""Import of a robot_state_publisher's description: xacro becomes a part, URDF becomes links."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class Workshop:
 def add_descriptions(
     draft: ImportDraft, descriptions: Iterable[Description], workshop: Workshop
 ) -> None:
-    """Add what robot_state_publishers are given.
+    """Add the descriptions of robot_state_publishers.
 
-    Of several URDFs the first becomes links, and each other is named.
+    The first URDF becomes links; further ones are only named.
     """
     for described in descriptions:
         if draft.is_adopted:

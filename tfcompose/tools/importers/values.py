@@ -1,8 +1,6 @@
-"""Bodies, joints and poses in the words of the robot file, as plain data.
+"""Bodies, joints and poses as plain data in the robot file's language.
 
-What is the default is left out.
-
-Angles are in degrees where that is exact, and else in radians with all digits.
+Defaults are omitted. Angles are in degrees if that is exact, else in radians with all digits.
 """
 
 from __future__ import annotations
@@ -38,10 +36,9 @@ _DIAGONAL = ("ixx", "iyy", "izz")
 
 
 class RobotFileValues:
-    """The values of one robot; a colour that has been described once is later its name alone.
+    """The values of one robot; later uses of a described colour have only its name.
 
-    ``rpy`` are the angles by which the source has rotations; ``target`` says how files are
-    addressed.
+    ``rpy`` are the source's angles of rotations; ``target`` says how files are addressed.
     """
 
     def __init__(self, rpy: Mapping[Quaternion, Vector], robot: Robot, target: Target) -> None:
@@ -68,7 +65,7 @@ class RobotFileValues:
         return body | ({"inertial": self.inertial(link.inertial)} if link.inertial else {})
 
     def shape(self, shape: Shape, *, plain: bool = False) -> dict[str, Any]:
-        """Return the shape; ``plain``, without its colour."""
+        """Return the shape; ``plain``: without its colour."""
         values = self.pose(shape.pose) | {shape.kind: self.size(shape)}
         return (
             values
@@ -125,7 +122,7 @@ class RobotFileValues:
 
 
 def angle(value: float) -> str | float:
-    """Return the angle (rad) as the robot file has it: ``-90 deg``, or radians."""
+    """Return the angle (rad) in the form of a robot file: ``-90 deg``, or radians."""
     degrees = round(math.degrees(value), _DECIMALS) + 0.0
     if abs(math.radians(degrees) - value) > _MEANT_RAD:
         return value
@@ -133,7 +130,7 @@ def angle(value: float) -> str | float:
 
 
 def rotation(quat_xyzw: Quaternion, source_rpy: Vector | None = None) -> list[str | float] | None:
-    """Return roll, pitch and yaw as the robot file has them, or None for no rotation."""
+    """Return roll, pitch and yaw in the form of a robot file, or None for no rotation."""
     if quat_xyzw == Pose().quat_xyzw:
         return None
     rpy = source_rpy or clean_rpy(quat_xyzw)

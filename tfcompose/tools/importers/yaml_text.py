@@ -1,4 +1,4 @@
-"""Expressions and arguments of a robot file among texts that may hold anything."""
+"""Expressions and arguments of a robot file, next to arbitrary text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class ExpressionText(str):
-    """An expression, which is computed: ``${…}`` in the written file."""
+    """An expression to evaluate: ``${…}`` in the written file."""
 
     __slots__ = ()
 

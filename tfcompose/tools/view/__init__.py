@@ -1,7 +1,5 @@
-"""Shows a robot in the browser, and moves what is mounted.
+"""Browser view of a robot, and editing of its mounts.
 
-A new pose becomes edits of the robot file.
-
-``edit`` is pure functions over the file's text; ``scene`` and ``panel`` stand on viser. Files are
-read, compiled and written by whoever starts the view.
+A new pose becomes edits of the robot file. ``edit`` is pure functions over the file's text;
+``scene`` and ``panel`` use viser. The caller reads, compiles and writes files.
 """

@@ -1,10 +1,8 @@
-"""A recording as it is shown.
+"""A recording for the view: poses of frames at any time, and findings.
 
-Where frames were at a time, in any order of times, and what is wrong with it.
-
-All of a bag's transforms are kept as numbers, 64 bytes each. At a time, each frame has the pose
-that was recorded last until then; a fixed edge holds at any time, as in tf2, so that before its
-first message it has that one's.
+All transforms of a bag are kept as numbers, 64 bytes each. A frame has the pose that was recorded
+last before the shown time. A fixed edge is valid at any time, as in tf2, so before its first
+message it has that message's pose.
 """
 
 from __future__ import annotations
@@ -65,7 +63,7 @@ class _Track:
 
 
 class RecordingObserver(TreeObserver):
-    """Keeps every transform besides what it observes, by frame."""
+    """Keeps every transform besides the observation, by frame."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -94,7 +92,7 @@ class RecordingObserver(TreeObserver):
 
 
 class Recorded:
-    """All of a bag on pairs of topics (moving, fixed).
+    """The contents of a bag on pairs of topics (moving, fixed).
 
     Raises:
         BagError: if it cannot be read, or has none of the topics.
@@ -109,7 +107,7 @@ class Recorded:
 
     @property
     def length_s(self) -> float:
-        """How long it is from the first transform to the last."""
+        """The time from the first transform to the last, in seconds."""
         return (self.end_ns - self.begin_ns) / _SECOND_NS
 
 
@@ -164,7 +162,7 @@ class BagTree(ShownTree):
         return {name: row for name, (_, _, row) in found.items()}
 
     def about(self, frame: str) -> list[str]:
-        """Return the edge above a frame at the time, then what is wrong in the recording."""
+        """Return text about the edge above a frame at the shown time, then findings."""
         if frame in self._rows:
             track, index, row = self._rows[frame]
             rate = self._rates.get(frame)

@@ -1,4 +1,4 @@
-"""``view --bag``: the browser view shows a recording at a time."""
+"""``view --bag``: the browser view shows a recording at a chosen time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STEP_S = 0.01
 
 
 class BagSource(SceneSource):
-    """A bag, at a time, with the robot that a session has.
+    """A bag at a chosen time, with the robot of a session.
 
     Raises:
         SystemExit: after saying why the bag cannot be shown, or not at that time.
@@ -58,7 +58,7 @@ class BagSource(SceneSource):
 def show_recording(
     server: viser.ViserServer | viser.ClientHandle, panel: Panel, tree: BagTree, length_s: float
 ) -> PublishedTree:
-    """Show a recorded tree beside the panel of its robot, with a slider of its time."""
+    """Show a recorded tree next to the panel of its robot, with a time slider."""
     section = PublishedTree(server, panel, tree, "Tree")
     with server.gui.add_folder("Recording", order=-2):
         slider = server.gui.add_slider(

@@ -1,4 +1,4 @@
-"""Camera of a scene: named views that show all of it, in perspective or parallel."""
+"""Camera of a scene: named views that fit all of it, in perspective or parallel projection."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ class Bounds:
 
     @classmethod
     def around(cls, points: Any, least_m: float) -> Bounds:
-        """Return the bounds of points, shape (n, 3), and ``least_m`` beyond them."""
+        """Return the bounds of points, shape (n, 3), with a margin of ``least_m`` metres."""
         least, most = points.min(axis=0), points.max(axis=0)
         return cls((least + most) / 2, float(np.linalg.norm(most - least)) / 2 + least_m)
 
     def position(self, view: str, *, is_parallel: bool = False) -> Any:
-        """Return where the camera of a named view is, in metres."""
+        """Return the camera position of a named view, in metres."""
         direction = np.array(VIEWS[view]) / np.linalg.norm(VIEWS[view])
         angle = _PARALLEL_RAD if is_parallel else _WIDE_RAD
         return self.middle + direction * self.radius / _FILLED / math.sin(angle / 2)
 
 
 def begin_at(server: viser.ViserServer | viser.ClientHandle, bounds: Bounds) -> None:
-    """Let the camera of each new window begin where all is in the picture."""
+    """Place the camera of each new window so that the whole scene is visible."""
     server.initial_camera.look_at = bounds.middle
     server.initial_camera.position = bounds.position("corner")
 
@@ -67,7 +67,7 @@ def go_to(client: viser.ClientHandle, bounds: Bounds, view: str, *, is_parallel:
 
 
 def project(client: viser.ClientHandle, *, is_parallel: bool) -> None:
-    """Show what the window shows in parallel, or in perspective again, as large as before."""
+    """Switch the window between parallel and perspective projection, at the same size."""
     camera = client.camera
     angle = _PARALLEL_RAD if is_parallel else _WIDE_RAD
     nearer = math.tan(camera.fov / 2) / math.tan(angle / 2)

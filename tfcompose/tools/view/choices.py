@@ -1,6 +1,6 @@
 """Selection and visibility chosen in a view, by name.
 
-It outlives the panel, which is rebuilt when a file changes.
+They outlive the panel, which is rebuilt when a file changes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""From a mount's new pose to edits of the robot file that change nothing else.
+"""Edits of the robot file for a mount's new pose, with nothing else changed.
 
-The number is changed where it stands, in the unit in which it stands, through ``place`` and
-``relative_to``. A value that is not a mount's own (a variable's, an included file's, a
-calibration's, one that others share) is left alone: then an overlay can replace it.
+The number is changed where it is written, in its unit, through ``place`` and ``relative_to``. A
+value that is not the mount's own (a variable's, an included file's, a calibration's, a shared one)
+is left alone; an overlay can replace it instead.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _NUMBER = re.compile(r"([-+.0-9eE]+?)(\s*)([A-Za-z][A-Za-z/]*)?\s*")
 
 
 class ImmovableError(Exception):
-    """No file says where the frame is, so none can be edited."""
+    """No file gives the frame's pose, so there is nothing to edit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Elsewhere:
     values: Mapping[str, str | None]
 
     def overlay(self, text: str, file: str) -> str:
-        """Return the text of an overlay, which may be empty, with these values in it."""
+        """Return the text of an overlay, which may be empty, with these values added."""
         return with_value(text, file, self.entry, self.values)
 
 
@@ -96,12 +96,12 @@ class Mount:
 
     @property
     def is_optical(self) -> bool:
-        """Whether the frame whose pose is given has z as its viewing direction."""
+        """Whether the frame whose pose is given looks along z."""
         name = str(self.entry[-1]) if self.entry[2:3] == ("frames",) else self.place
         return is_optical(name)
 
     def pose_in_file(self, parent_from_child: Pose) -> Pose:
-        """Return the pose that the file has to give for the edge to have this one."""
+        """Return the pose that the file must give for the edge to have this one."""
         return self.parent_from_base.inverse() @ parent_from_child @ self.child_from_place
 
     def of_edge(self, pose: Pose) -> Pose:
@@ -110,7 +110,7 @@ class Mount:
 
 
 def mount_of(robot: Robot, source: Source, child: str) -> Mount:
-    """Return what the file has of the edge above a frame.
+    """Return the file's entry for the edge above a frame.
 
     Raises:
         ImmovableError: if the edge is not one that a robot file places.
@@ -145,10 +145,10 @@ def mount_of(robot: Robot, source: Source, child: str) -> Mount:
 def change_of(
     robot: Robot, source: Source, texts: Mapping[str, str], child: str, parent_from_child: Pose
 ) -> MountEdits | Elsewhere:
-    """Return the edits that give the frame this pose, or the value that forbids them.
+    """Return the edits that give the frame this pose, or the value that prevents them.
 
-    ``source`` is what the robot was made from, overlays merged over it; ``texts`` are the files
-    that may be edited, by the names that spans have.
+    ``source`` is the robot's source, with overlays merged over it; ``texts`` are the editable
+    files, by their names in spans.
 
     Raises:
         ImmovableError: if no robot file says where the frame is.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def numbers(pose: Pose) -> str:
-    """Return a pose as people read it, in mm and degrees."""
+    """Return a pose for display, in mm and degrees."""
     x, y, z = (f"{value * 1000:.4g}" for value in pose.xyz)
     roll, pitch, yaw = (f"{math.degrees(angle):.4g}" for angle in clean_rpy(pose.quat_xyzw))
     return f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg"

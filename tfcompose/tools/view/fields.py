@@ -35,12 +35,10 @@ _REACH_M = 0.5
 
 
 def rims(optics: Optics) -> list[Any]:
-    """Return what bounds the field of view: polylines, arrays (n, 3) in the stream's frame.
+    """Return the boundary of the field of view: polylines, arrays (n, 3) in the stream's frame.
 
-    None if it is not known.
-
-    A camera's points are at a depth of 1 (along its optical axis), those of all others at a
-    distance of 1. A polyline that comes round ends where it begins.
+    Empty if it is unknown. A camera's points are at a depth of 1 along its optical axis, those of
+    other sensors at a distance of 1. A closed polyline ends at its first point.
     """
     if optics.projection == "fisheye":
         if optics.diagonal is None:
@@ -100,12 +98,10 @@ def _directions(azimuths: Any, elevations: Any) -> Any:
 
 
 def outline(optics: Optics, reach: float) -> Any:
-    """Return the lines that show a field of view as far as ``reach`` metres.
+    """Return the lines that show a field of view up to ``reach`` metres.
 
-    An array (n, 2, 3) in the stream's frame.
-
-    They are the rims where the stream begins to see and where the drawing ends, and lines from one
-    to the other.
+    An array (n, 2, 3) in the stream's frame: the rims at the least range and at the end of the
+    drawing, and lines between them.
     """
     far, near = min(reach, optics.far or reach), optics.near or 0.0
     made = []
@@ -143,7 +139,7 @@ def surface(optics: Optics, reach: float) -> tuple[Any, Any]:
 
 
 def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
-    """Yield the streams with a known field of view, one of those that see the same."""
+    """Yield the streams with a known field of view, once for each frame and view."""
     for sensor in robot.sensors:
         for optics in different_streams(sensor):
             if optics.frame in robot.frames and rims(optics):
@@ -151,16 +147,15 @@ def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
 
 
 def reach_at_scale(scale: float) -> float:
-    """Return how far fields of view are drawn at a scale, in metres."""
+    """Return the drawn length of fields of view at a scale, in metres."""
     return round(_REACH_M * scale, 2)
 
 
 class FieldsOfView:
-    """The fields of view in a scene, hidden at first but for those of cameras.
+    """The fields of view in a scene; at first only those of cameras are shown.
 
-    ``update`` moves them.
-
-    They are drawn as far as ``reach``, in metres, which begins at a ``scale``.
+    ``update`` moves them. They are drawn up to ``reach``, in metres, which initially depends on
+    ``scale``.
     """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, scale: float = 1.0) -> None:
@@ -182,7 +177,7 @@ class FieldsOfView:
         self.draw(reach_at_scale(scale))
 
     def draw(self, reach: float) -> None:
-        """Draw the fields of view as far as that, in metres."""
+        """Draw the fields of view up to this length, in metres."""
         self.reach = reach
         for index, (_, optics) in enumerate(self._streams):
             colour = FIELD_COLOURS[optics.kind]
@@ -206,7 +201,7 @@ class FieldsOfView:
             )
 
     def update(self, poses: Mapping[str, Pose]) -> None:
-        """Put every field of view where its frame is, in the root of its tree."""
+        """Move every field of view to its frame's pose, in the root of its tree."""
         for handle, (_, optics) in zip(self._frames, self._streams, strict=True):
             if optics.frame in poses and poses[optics.frame] != self._at.get(optics.frame):
                 x, y, z, w = poses[optics.frame].quat_xyzw
@@ -214,9 +209,9 @@ class FieldsOfView:
         self._at = poses
 
     def points(self, poses: Mapping[str, Pose]) -> Any:
-        """Return the ends of what is drawn of the shown fields of view, shape (n, 3), in metres.
+        """Return the end points of the shown fields of view, shape (n, 3), in metres.
 
-        That is where frames have these poses in the roots of their trees.
+        ``poses`` are those of frames in the roots of their trees.
         """
         found = [np.zeros((0, 3))]
         for sensor, optics in self._streams:
@@ -227,18 +222,18 @@ class FieldsOfView:
         return np.concatenate(found)
 
     def pose(self, index: int) -> Pose:
-        """Return where the scene has the frame of a stream."""
+        """Return the pose in the scene of a stream's frame."""
         w, x, y, z = (float(value) for value in self._frames[index].wxyz)
         px, py, pz = (float(value) for value in self._frames[index].position)
         return Pose((px, py, pz), (x, y, z, w))
 
     def show(self, sensor: str, *, visible: bool) -> None:
-        """Show or hide what a sensor sees."""
+        """Show or hide a sensor's fields of view."""
         self.shown[sensor] = visible
         self.hide(self._hidden)
 
     def hide(self, frames: frozenset[str]) -> None:
-        """Hide the fields of view of these frames, and show those of other shown sensors."""
+        """Hide the fields of view of these frames, and show those of all other shown sensors."""
         self._hidden = frames
         for handle, (sensor, optics) in zip(self._frames, self._streams, strict=True):
             handle.visible = self.shown[sensor.name] and optics.frame not in frames

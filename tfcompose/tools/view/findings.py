@@ -1,6 +1,6 @@
-"""Findings, and what a save did, as HTML.
+"""Findings, and the result of a save, as HTML.
 
-Names in them come from files, and from whoever publishes.
+Names in them come from files and from other publishers, so they are escaped.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ _COLOURS = {"error": "rgb(220, 30, 30)", "warning": "rgb(200, 120, 20)"}
 
 
 def findings_html(findings: Sequence[Finding], none: str = "") -> str:
-    """Return findings as lines of HTML, the codes of errors in red.
+    """Return findings as lines of HTML, codes of errors in red.
 
-    ``none`` is what to say where there are none.
+    ``none`` is the text without findings.
     """
     lines = [_line(finding) for finding in findings[:MOST]] or [escape(none)]
     return paragraphs(
@@ -39,7 +39,7 @@ def _line(finding: Finding) -> str:
 
 
 def paragraphs(lines: Sequence[str]) -> str:
-    """Return lines of HTML one below the other, as wide as the panel."""
+    """Return lines of HTML below one another, as wide as the panel."""
     return (
         '<div style="padding: 0 0.7em; font-size: 0.85em; overflow-wrap:'
         f' anywhere">{"<br>".join(lines)}</div>'
@@ -47,10 +47,7 @@ def paragraphs(lines: Sequence[str]) -> str:
 
 
 def format_saved(saved: Saved) -> str:
-    """Return what a save did as HTML.
-
-    The diff, what is found in the result, and what no edit can give.
-    """
+    """Return the result of a save as HTML: the diff, findings, and values for an overlay."""
     if saved.refused:
         return paragraphs(["not saved, there would be errors:"]) + findings_html(saved.refused)
     text = paragraphs(["saved:" if saved.diff else "nothing to save"])

@@ -24,7 +24,7 @@ IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 class FrameForest:
     """The trees that frames form by their parents.
 
-    Where they form a loop, one of its frames counts as a root.
+    In a loop, one of the frames counts as a root.
     """
 
     def __init__(self, frames: Sequence[str], parents: Mapping[str, str]) -> None:
@@ -56,7 +56,7 @@ class FrameForest:
     def in_frame(self, frame: str, in_roots: Rows, others: Rows) -> Rows:
         """Return ``others`` in the frame's tree as poses in the frame.
 
-        Its own pose is in ``in_roots``.
+        ``in_roots`` has the frame's own pose.
         """
         same = self._root_of == self._root_of[self.index[frame]]
         inverse = np.array([row_of(pose_of(in_roots[self.index[frame]].tolist()).inverse())])
@@ -65,7 +65,7 @@ class FrameForest:
         return found
 
     def below(self, frames: set[str]) -> set[str]:
-        """Return these frames and all below them."""
+        """Return these frames and all frames below them."""
         reached = np.zeros(len(self.frames), bool)
         reached[[self.index[frame] for frame in frames if frame in self.index]] = True
         for rows, above in self._levels:

@@ -30,12 +30,12 @@ class Row:
 
     @property
     def style(self) -> str:
-        """How a page indents it."""
+        """The indentation of the row, as a style for a page."""
         return f"padding-left: {min(self.depth, _DEEPEST) * _INDENT_EM:.2f}em"
 
 
 class FrameTree:
-    """A robot's frames from top to bottom, below their first parent without a loop."""
+    """A robot's frames from top to bottom, below their first parents, without loops."""
 
     def __init__(self, robot: Robot) -> None:
         self._parents: dict[str, str] = {}
@@ -64,15 +64,15 @@ class FrameTree:
             self._open_levels += 1
 
     def parent(self, frame: str) -> str | None:
-        """Return the frame that this one is below, None for a root."""
+        """Return the frame's parent in the tree, None for a root."""
         return self._parents.get(frame)
 
     def is_open(self, frame: str, chosen: Mapping[str, bool]) -> bool:
-        """Return whether the tree is open below a frame: as chosen, or by its level."""
+        """Return whether the tree is open below a frame: as chosen, or depending on its level."""
         return chosen.get(frame, self._depths[frame] < self._open_levels)
 
     def open_to(self, frame: str) -> dict[str, bool]:
-        """Return what to choose so that a frame is among the rows: what is above it is open."""
+        """Return the choices that open the tree above a frame, so that it has a row."""
         return dict.fromkeys(way_up(frame, self._parents.get)[1:], True)
 
     def matches(self, search: str) -> set[str]:
@@ -83,7 +83,7 @@ class FrameTree:
     def rows(self, chosen: Mapping[str, bool], search: str = "") -> Iterator[Row]:
         """Yield the rows from top to bottom.
 
-        Below frames that are open, or what a search finds and all above that.
+        Only rows below open frames, or during a search, matches and all frames above them.
         """
         searches = bool(search.strip())
         found = self.matches(search)
@@ -102,9 +102,9 @@ class FrameTree:
             yield Row(frame, depth, is_open if has_more else None)
 
     def hidden_frames(self, chosen: Mapping[str, bool]) -> set[str]:
-        """Return the frames that are not shown.
+        """Return the hidden frames.
 
-        The nearest one above, or the frame itself, was chosen to be hidden.
+        A frame is hidden if it, or its nearest ancestor with a choice, was hidden.
         """
         is_shown: dict[str, bool] = {}
         for frame in self._depths:  # parents come first
@@ -112,7 +112,7 @@ class FrameTree:
         return {frame for frame, shown in is_shown.items() if not shown}
 
     def show(self, frame: str, chosen: Mapping[str, bool], *, shown: bool) -> dict[str, bool]:
-        """Return what is chosen when a frame, with all below it, is shown or hidden."""
+        """Return the choices that show or hide a frame with all frames below it."""
         others = below(self._children, frame)
         rest = {name: value for name, value in chosen.items() if name not in others}
         is_so_above = (frame in self.hidden_frames(rest)) != shown

@@ -1,4 +1,4 @@
-"""Sends joint states from sliders, only where nobody else sends them."""
+"""Joint states from sliders, sent only if no other node sends them."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _UNLIMITED = math.pi
 
 
 class PositionPublisher(Protocol):
-    """Publishes positions (rad or m) in the order of the names that it was made with."""
+    """Publishes positions (rad or m) in the order of the names it was created with."""
 
     def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
-        """Publish them with this time."""
+        """Publish positions with this time stamp."""
 
     def close(self) -> None:
         """Leave the topic."""
 
 
 def slider_range(joint: Joint) -> tuple[float, float]:
-    """Return how far a joint is moved, lowest and highest, in rad or m."""
+    """Return the range of a joint's slider, lowest and highest, in rad or m."""
     lower, upper = -_UNLIMITED, _UNLIMITED
     if joint.limit and joint.type != "continuous":
         lower = joint.limit.lower if joint.limit.lower is not None else lower
@@ -48,7 +48,7 @@ def slider_range(joint: Joint) -> tuple[float, float]:
 
 
 def first_positions(robot: Robot) -> dict[str, float]:
-    """Return where sliders begin: each joint at 0, or as near to it as its limits allow."""
+    """Return the initial positions of sliders: 0, or the nearest value within limits."""
     positions = {}
     for edge in robot.edges:
         if edge.joint and edge.joint.mimic is None:
@@ -60,9 +60,8 @@ def first_positions(robot: Robot) -> dict[str, float]:
 def joint_topics(robot: Robot, plan: Plan) -> dict[str, dict[str, str]]:
     """Return the topics from which the plan's processes take joint states.
 
-    The joints by their names there.
-
-    In the robot a joint of a part may have the part's prefix.
+    Each with its joints by their names there. In the robot, a joint of a part may have the part's
+    prefix.
     """
     found: dict[str, dict[str, str]] = {}
     joints = {robot.final(edge.child): edge.joint.name for edge in robot.edges if edge.joint}
@@ -98,7 +97,7 @@ class JointSender:
 
     @property
     def text(self) -> str:
-        """What it does, as people read it."""
+        """The state of the sender, for display."""
         them = list_names(self.others_found)
         return {
             "waiting": f"looking whether anybody publishes {self.topic}",
@@ -110,11 +109,10 @@ class JointSender:
     def step(
         self, now: float, stamp_ns: int | None, robot: Robot, positions: Mapping[str, float]
     ) -> None:
-        """Do what is due at ``now``, seconds of any clock.
+        """Do the work due at ``now``, in seconds of any clock.
 
-        Look for others, or send positions with this stamp.
-
-        ``positions`` are those of sliders, in rad or m; joints that mimic others follow.
+        Look for other publishers, or send positions with this stamp. ``positions`` are those of
+        sliders, in rad or m; mimic joints follow.
         """
         self._begun = now if self._begun is None else self._begun
         if now >= self._ask_at:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What is wrong: all findings, those of each frame, and distances from the plan."""
+    """Findings about a tree, by frame and in total, and deviations from the plan."""
 
     findings: tuple[Finding, ...] = ()
     of_frame: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
@@ -36,7 +36,7 @@ class Judgement:
 
     @property
     def wrong(self) -> frozenset[str]:
-        """The frames whose edges have an error."""
+        """The frames with an error on their edge."""
         return frozenset(
             frame
             for frame, findings in self.of_frame.items()
@@ -45,7 +45,7 @@ class Judgement:
 
     @property
     def summary(self) -> str:
-        """What there is to say where nothing is found."""
+        """The text for a tree without findings."""
         return (
             f"elsewhere than declared: {list_names(sorted(self.off))}"
             if self.off
@@ -53,7 +53,7 @@ class Judgement:
         )
 
     def about(self, frame: str) -> list[str]:
-        """Return a line for each thing that is wrong with the edge above a frame."""
+        """Return a line for each finding about the edge above a frame."""
         off = [f"off by {self.off[frame].text}"] if frame in self.off else []
         return off + [
             f"{finding.code} {finding.message}" for finding in self.of_frame.get(frame, ())
@@ -61,9 +61,9 @@ class Judgement:
 
 
 class PlanJudge:
-    """Judges a robot by its plan; poses may be off by the tolerance.
+    """Judges a robot by its plan; poses may deviate by the tolerance.
 
-    Frames have the names of the robot's file.
+    Frames have the names in the robot's file.
     """
 
     def __init__(self, robot: Robot, plan: Plan, tolerance: Offset) -> None:
@@ -81,10 +81,10 @@ class PlanJudge:
         counts: Callable[[Difference], bool],
         holds: Callable[[EdgeState], bool] = lambda _: False,
     ) -> Judgement:
-        """Return what is wrong with states on the plan's topics.
+        """Return findings about states on the plan's topics.
 
-        Frames are also off where those are that do not count, if what was sent ``holds``: nothing
-        came after it.
+        A difference that does not count still marks its frame as off if its transform ``holds``,
+        that is, no newer one came.
         """
         findings: list[Finding] = []
         of_frame: dict[str, list[Finding]] = {}

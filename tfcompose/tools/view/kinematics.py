@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def joint_positions(robot: Robot, positions: Mapping[str, float]) -> dict[str, float]:
-    """Return where each joint is, in rad or m, from the ``positions`` of some.
+    """Return the position of each joint, in rad or m, from the ``positions`` of some.
 
     A joint that mimics another follows it; one without a position is at 0.
     """

@@ -1,10 +1,8 @@
-"""A running tree as it is shown.
+"""A running tree for the view: poses of frames, edges with errors, and publishers.
 
-Where its frames are, which edges are wrong, and who publishes them.
-
-A ``LiveTree`` is given observers, which somebody feeds, and returns data for a scene and a panel;
-it reads no clock, no topic and knows no browser. Frames have the names of the robot file; on the
-tree they may have a prefix.
+The caller feeds observers of a ``LiveTree``, which returns data for a scene and a panel. It reads
+no clock and no topic and does not depend on a browser. Frames have the names of the robot file; on
+the tree they may have a prefix.
 """
 
 from __future__ import annotations
@@ -74,7 +72,10 @@ class LiveTree(ShownTree):
         return {self._pictures.name(child): stream for child, stream in newest.items()}
 
     def judge(self, listened_s: float) -> Judgement:
-        """Judge what came, after so many seconds of listening, and return what is wrong."""
+        """Judge the received messages after this many seconds of listening.
+
+        Return the findings.
+        """
         states = {
             topics: state_of(observer, topics) for topics, observer in self._observers.items()
         }
@@ -92,9 +93,9 @@ class LiveTree(ShownTree):
         return self.judgement
 
     def about(self, frame: str) -> list[str]:
-        """Return what is known of the edge above a frame.
+        """Return text about the edge above a frame.
 
-        A line for each publisher, then what is wrong.
+        A line for each publisher, then findings.
         """
         edges = self._pictures.edges
         lines = [line for state in self._states.get(frame, ()) for line in _published_lines(state)]

@@ -55,16 +55,17 @@ def observers_of(plan: Plan) -> dict[Topics, TreeObserver]:
 
 
 class LiveWindow(NamedTuple):
-    """What shows a running tree in a window."""
+    """The live parts of a window."""
 
     tree: LiveTree
     panel: PublishedTree
 
 
 class LiveSource(SceneSource):
-    """Moves the scenes of all windows, judges and asks, each as often as it is due.
+    """Updates the scenes of all windows, judges, and asks, each at its own interval.
 
-    With ``joints`` sliders publish joint states: those of the window in which one was moved last.
+    With ``joints``, sliders publish joint states. Those of the window whose slider was moved last
+    count.
 
     Args:
         observers: by topics (moving, fixed): those of the plan.
@@ -88,7 +89,7 @@ class LiveSource(SceneSource):
         self.senders: list[JointSender] = []
 
     def show_in(self, shown: ReloadedPanel) -> None:
-        """Show the tree in a window, beside the panel of its robot."""
+        """Show the tree in a window, next to the panel of its robot."""
         robot, plan = shown.session.robot, plan_of_session(shown.session)
         known = {pair: self._observers.get(pair) or TreeObserver() for pair in parts_of(plan)}
         tree = LiveTree(robot, plan, known, self._tolerance)
@@ -96,7 +97,7 @@ class LiveSource(SceneSource):
         self._judge_at = self._ask_at = 0.0
 
     def run(self, windows: Windows, changed: threading.Event) -> int:
-        """Follow the tree until a signal comes, in a process that is set up for its ROS.
+        """Follow the tree until a signal, in a process that is set up for its ROS.
 
         Return the exit code.
 
@@ -111,7 +112,7 @@ class LiveSource(SceneSource):
         return INTERRUPTED
 
     def follow(self, windows: Windows, changed: threading.Event, stop: Stop) -> None:
-        """Follow the tree until ``stop`` is requested; of files that changed show the new robot.
+        """Follow the tree until ``stop`` is requested; show the new robot if files change.
 
         Raises:
             RosError: if ROS cannot start a node, or take messages.

@@ -1,7 +1,7 @@
 """A robot as one page for a pull request or a ticket.
 
-It needs no network: the frames with their owners, poses and places, a picture of them that is
-turned in the browser, and a slider for each joint.
+It needs no network: the frames with owners, poses and places, a picture that can be turned in the
+browser, and a slider for each joint.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _DECIMALS = 5
 
 
 def page_of(robot: Robot, sources: Sequence[Source]) -> str:
-    """Return the page of a robot; ``sources`` are the files in which its values stand."""
+    """Return the page of a robot; ``sources`` are the files that hold its values."""
     colours = colours_of(robot)
     tree = FrameTree(robot)
     rows = []

@@ -1,7 +1,4 @@
-"""The panel next to the scene.
-
-A selected frame, the owners, joints to move, and the pose of a mount to edit.
-"""
+"""The panel next to the scene: a selected frame, owners, joints, and a mount's pose to edit."""
 
 from __future__ import annotations
 
@@ -92,11 +89,10 @@ def _phase(slider: Any) -> float:
 class Panel:
     """Shows a session on a server.
 
-    With ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
-
-    ``server`` may be one client of it, whose ``window`` it then is. ``choices`` are what somebody
-    chose to see, which the panel changes. ``published`` are the poses of frames in their roots
-    where something else than the session says where they are.
+    With ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved. ``server``
+    may be one client of a server; ``window`` is then its window. ``choices`` are the user's, which
+    the panel changes. ``published`` are the poses of frames in their roots if another source than
+    the session gives them.
     """
 
     def __init__(  # noqa: PLR0913 (where, what and how it is shown)
@@ -170,17 +166,17 @@ class Panel:
         self._show_blocked()
 
     def end(self) -> None:
-        """Move nothing any more: another panel takes this one's place, or none."""
+        """Stop moving anything: another panel takes over, or none."""
         self.is_gone = True
         self.scene.end()
 
     def refresh(self) -> None:
-        """Put the scene where joints and mounts are now."""
+        """Update the scene to the current joints and mounts."""
         if self.published is None:
             self.scene.update(self.session.robot, self.poses())
 
     def poses(self) -> Mapping[str, Pose]:
-        """Return where each frame is shown, in the root of its tree."""
+        """Return the shown pose of each frame, in the root of its tree."""
         return self.published or poses_in_roots(self.session.robot, self.positions)
 
     @property
@@ -432,7 +428,7 @@ class Panel:
         self._show_selected()
 
     def move(self, pose: Pose) -> None:
-        """Give the selected mount the pose that its file is to have."""
+        """Give the selected mount the pose to be written to its file."""
         try:
             mount = self.session.mount(self.selected)
         except ImmovableError as error:
@@ -445,10 +441,10 @@ class Panel:
             self.gizmo.wxyz, self.gizmo.position = wxyz(at), at.xyz
 
     def save(self) -> None:
-        """Save what was moved, and report it.
+        """Save the moved mounts, and report the result.
 
-        What another window has saved at another pose meanwhile is said first; the next save
-        replaces it.
+        If another window has meanwhile saved a mount at another pose, report that first; the next
+        save overwrites it.
         """
         with self.window.lock:
             conflicts = sorted(self.window.conflicts & self.session.moved.keys())
@@ -471,6 +467,6 @@ class Panel:
                 self.window.share()
 
     def say(self, html: str) -> None:
-        """Show a report where mounts are edited."""
+        """Show a report in the section for editing mounts."""
         if self._numbers:
             self.report.content = html

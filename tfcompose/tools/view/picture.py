@@ -41,9 +41,8 @@ class Picture:
 class Pictures:
     """Makes pictures of a robot.
 
-    Frames have the names of its file, which may be others on the tree.
-
-    What is in one tree with the ``fixed`` frame is shown as seen from there; empty: from its root.
+    Frames have the names of its file, which may differ on the tree. Frames in one tree with the
+    ``fixed`` frame are shown in that frame; empty: in their root.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -58,7 +57,7 @@ class Pictures:
         self._grow({edge.child: edge.parent for edge in self.edges.values()})
 
     def name(self, frame: str) -> str:
-        """Return the name in the robot's file of a frame on the tree; others keep theirs."""
+        """Return the robot file's name for a frame on the tree; other frames keep theirs."""
         return self._names.get(frame, frame)
 
     def next(self, newest: Mapping[str, Row], judgement: Judgement) -> Picture | None:
@@ -144,7 +143,7 @@ class Pictures:
 
 
 class ShownTree(ABC):
-    """A tree of transforms that is shown, and judged, as it runs or at a time of a recording."""
+    """A tree of transforms, shown and judged: live, or at a time of a recording."""
 
     judgement: Judgement
 
@@ -154,7 +153,7 @@ class ShownTree(ABC):
 
     @property
     def fixed(self) -> str:
-        """The frame from which its tree is shown; empty: the root."""
+        """The frame in which its tree is shown; empty: the root."""
         return self._pictures.fixed
 
     @fixed.setter
@@ -162,12 +161,12 @@ class ShownTree(ABC):
         self._pictures.fixed = frame
 
     def next_picture(self) -> Picture | None:
-        """Return all poses if something moved or its judgement changed; else None."""
+        """Return all poses if a frame moved or its judgement changed, else None."""
         return self._pictures.next(self._newest(), self.judgement)
 
     @abstractmethod
     def about(self, frame: str) -> list[str]:
-        """Return what is known of the edge above a frame, then what is wrong with it."""
+        """Return text about the edge above a frame, then findings."""
 
     @abstractmethod
     def _newest(self) -> Mapping[str, Row]:

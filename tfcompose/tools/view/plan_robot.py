@@ -1,6 +1,6 @@
-"""A built plan as a robot that can be shown.
+"""A built plan as a robot for the view.
 
-Its edges, with the bodies and joint limits of the description.
+It has the plan's edges, and bodies and joint limits from the description.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 def robot_of_plan(plan: Plan, description: str | None, file: str, find: Finder) -> Robot:
     """Return the robot that a plan describes, frames named as on the live tree.
 
-    ``description`` is the text of the URDF beside the plan in ``file``, None where there is none;
-    ``find`` looks for its meshes.
+    ``description`` is the text of the URDF next to the plan in ``file``, None without one;
+    ``find`` looks up its meshes.
 
     Raises:
         RejectedError: if that is no URDF.

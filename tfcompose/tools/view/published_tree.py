@@ -24,7 +24,7 @@ _MOST = 40
 
 
 class PublishedTree:
-    """The section of a tree that runs, or was recorded, in the panel of its robot."""
+    """The panel's section about the running or recorded tree of its robot."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class PublishedTree:
         self.tree.fixed = self._panel.choices.fixed = self.fixed.value
 
     def show(self) -> None:
-        """Put the scene where the tree is now; nothing is sent for what stays."""
+        """Update the scene to the current tree; unchanged frames send nothing."""
         picture = self.tree.next_picture()
         if picture is None:
             return
@@ -69,7 +69,7 @@ class PublishedTree:
         self._show_further(picture)
 
     def show_text(self) -> None:
-        """Say what is wrong, and what is known of the selected frame."""
+        """Show the findings, and the facts about the selected frame."""
         frame = self._panel.selected
         self._panel.tree.mark(self.tree.judgement.wrong)
         _set(
@@ -79,11 +79,11 @@ class PublishedTree:
         _set(self._found, findings_html(self.tree.judgement.findings, self.tree.judgement.summary))
 
     def show_joints(self, lines: Sequence[str]) -> None:
-        """Say whether sliders publish joint states, or who does instead."""
+        """Show whether sliders publish joint states, or which node does instead."""
         _set(self._joints, paragraphs([escape(line) for line in lines]))
 
     def show_processes(self, title: str, rows: Sequence[Sequence[str]]) -> None:
-        """Show the processes of the robot that runs, the first row being the heads of columns."""
+        """Show the processes of the running robot; the first row has the column heads."""
         _set(self._processes, _table(title, rows))
 
     def _show_further(self, picture: Picture) -> None:

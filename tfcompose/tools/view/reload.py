@@ -1,6 +1,6 @@
 """Shows a file again when it changes on disk.
 
-While it is broken the last good scene stays, with what is found.
+While it is broken, the last valid scene stays, with the findings.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ _TOGETHER_MS = 100
 
 
 class WatchedFiles:
-    """Reads files, and knows which it has read, and what was in them.
+    """Reads files, and remembers their contents.
 
-    Of meshes, when they were changed.
+    For meshes, it remembers the time of their last change.
     """
 
     def __init__(self, read: Callable[[str], str]) -> None:
@@ -50,23 +50,23 @@ class WatchedFiles:
         return text
 
     def wrote(self, file: str, text: str) -> None:
-        """Know of a text that the file has from now on: it is no change."""
+        """Remember a text just written to the file, so that it is not a change."""
         self._texts[file] = text
 
     def look_at(self, meshes: Iterable[str]) -> None:
-        """Know of these mesh files, and no others, and when they were changed."""
+        """Remember these mesh files, and no others, with the times of their last changes."""
         self._meshes = {file: _mtime_ns(file) for file in meshes}
 
     @property
     def folders(self) -> set[Path]:
-        """The folders of all files that were read: editors replace files by others."""
+        """The folders of all files read, because editors replace files."""
         files = (*self._texts, *self._meshes)
         return {
             folder for file in files if is_folder(folder := Path(os.path.realpath(file)).parent)
         }
 
     def differ(self) -> bool:
-        """Return whether a file has another text than when it was read, or a mesh was changed."""
+        """Return whether a file's text differs from the one read, or a mesh has changed."""
         return any(self._now(file) != text for file, text in self._texts.items()) or any(
             _mtime_ns(file) != before for file, before in self._meshes.items()
         )
@@ -130,7 +130,7 @@ def meshes_of(robot: Robot) -> set[str]:
 
 
 class ReloadedPanel:
-    """The panel of a session, made anew with each good version of its files.
+    """The panel of a session, made anew with each valid version of its files.
 
     Args:
         server: where it is shown, or the window of it.
@@ -155,9 +155,9 @@ class ReloadedPanel:
         files.look_at(meshes_of(session.robot))
 
     def accept(self, texts: Mapping[str, str], state: Compiled) -> bool:
-        """Show the files as they are now, or what is wrong with them.
+        """Show the current files, or findings about them.
 
-        Return whether there is another panel.
+        Return whether there is a new panel.
         """
         if not self.session.accepts(state):
             self.show(state.findings)
@@ -178,14 +178,14 @@ class ReloadedPanel:
 
     @property
     def found(self) -> str:
-        """What is said to be wrong with the files as they are now, as HTML.
+        """The findings about the current files, as HTML.
 
-        Empty where nothing is.
+        Empty if there are none.
         """
         return self._broken.content if self._broken else ""
 
     def show(self, findings: tuple[Finding, ...]) -> None:
-        """Say what is wrong with the files as they are now."""
+        """Show the findings about the current files."""
         if self._broken is None:
             with self.server.gui.add_folder("File", order=-2):
                 self._broken = self.server.gui.add_html("")

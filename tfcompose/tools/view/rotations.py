@@ -1,8 +1,8 @@
-"""A rotation in the form in which a file gives it, changed as little as possible.
+"""A rotation in the form that a file uses, changed as little as possible.
 
 Each form is numbers by their path below the key: ``(0,)`` of ``rpy``, ``("axis", 0)``,
-``("down",)`` of ``look``. What is returned are the numbers of the new rotation, of all that say
-the same the ones nearest to those that are there.
+``("down",)`` of ``look``. Functions return the numbers of the new rotation; of equivalent ones,
+those nearest to the old numbers.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SAME_AXIS = 1e-9
 def rpy_near(rotation: Quaternion, old: Vector, tolerance: float) -> Vector:
     """Return roll, pitch and yaw of a rotation.
 
-    Those in which the fewest numbers differ from the old ones.
+    Of equivalent angles, those with the fewest numbers that differ from the old ones.
     """
 
     def changes(rpy: Vector) -> tuple[int, float]:
@@ -80,7 +80,7 @@ def rpy_numbers(rotation: Quaternion, old: Numbers, tolerance: float) -> Numbers
 
 
 def quat_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) -> Numbers:
-    """Return the numbers of ``quat_xyzw``, on the side of the old one."""
+    """Return the numbers of ``quat_xyzw``, with the sign nearer to the old one."""
     sign = math.copysign(1.0, sum(part * old[index,] for index, part in enumerate(rotation)))
     return {(index,): sign * part for index, part in enumerate(rotation)}
 
@@ -94,7 +94,7 @@ def matrix_numbers(rotation: Quaternion, _old: Numbers, _tolerance: float) -> Nu
 
 
 def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) -> Numbers:
-    """Return the numbers of ``axis_angle``: only another angle, if the axis is the same."""
+    """Return the numbers of ``axis_angle``; if the axis is the same, only the angle changes."""
     old_axis = (old["axis", 0], old["axis", 1], old["axis", 2])
     length = norm(old_axis)
     x, y, z, w = normalise(rotation)
@@ -117,7 +117,7 @@ def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) ->
 def direction_numbers(rotation: Quaternion, old: Numbers, tolerance: float) -> Numbers:
     """Return the numbers of ``look`` with angles.
 
-    In the keys that are there, and in others where they are needed.
+    Existing keys are used, and others added only if needed.
     """
     up, left = ("up",) in old, ("right",) not in old
     pitch_key, yaw_key = "up" if up else "down", "left" if left else "right"

@@ -1,7 +1,4 @@
-"""A robot as a scene of viser.
-
-Bodies, frames as axes, and edges as lines in the colour of their owner.
-"""
+"""A robot as a viser scene: bodies, frames as axes, and edges as lines in owners' colours."""
 
 from __future__ import annotations
 
@@ -41,13 +38,13 @@ _RULER = (20, 20, 20)
 
 
 def wxyz(pose: Pose) -> tuple[float, float, float, float]:
-    """Return the rotation in the order that viser takes."""
+    """Return the rotation in viser's order."""
     x, y, z, w = pose.quat_xyzw
     return (w, x, y, z)
 
 
 def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
-    """Return a colour for each owner of an edge, in the order of the tree."""
+    """Return a colour for each owner of an edge, in tree order."""
     owners = dict.fromkeys(edge.owner for edge in robot.edges)
     colours = {}
     for index, owner in enumerate(owners):
@@ -66,9 +63,9 @@ def colour_of(shape: Shape) -> tuple[int, int, int]:
 
 
 def scale_of(sides: Iterable[float]) -> float:
-    """Return how large axes and the like are drawn, against a robot whose largest body is 1 m.
+    """Return the scale of axes and other marks; 1 for a robot whose largest body is 1 m.
 
-    It is the root of the longest of the bodies' ``sides``, in metres.
+    It is the square root of the longest of the bodies' ``sides``, in metres.
     """
     return math.sqrt(max(sides, default=1.0) or 1.0)
 
@@ -97,10 +94,10 @@ def _add_shape(
 
 
 class RobotScene:
-    """What a scene shows of one robot; ``update`` moves it.
+    """The scene of one robot; ``update`` moves it.
 
-    Reading the meshes of an arm takes seconds. A link that has collision shapes is shown by these
-    until ``add_meshes`` has read what its visual ones need.
+    Reading the meshes of an arm takes seconds. A link with collision shapes shows these until
+    ``add_meshes`` has read its visual meshes.
     """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
@@ -148,9 +145,9 @@ class RobotScene:
         self.fields = FieldsOfView(scene, robot, self.scale)
 
     def add_meshes(self) -> None:
-        """Show visual meshes in the place of collision shapes.
+        """Replace collision shapes with visual meshes.
 
-        A mesh that cannot be read leaves them.
+        A link with an unreadable mesh keeps its collision shapes.
         """
         for frame, name, shapes, before in self._later:
             if any(mesh_of(shape) is None for shape in shapes):
@@ -163,10 +160,7 @@ class RobotScene:
                     handle.remove()
 
     def end(self) -> None:
-        """Let ``add_meshes`` change nothing any more.
-
-        Another scene takes this one's place, or none.
-        """
+        """Stop ``add_meshes`` from changing anything: another scene takes over, or none."""
         with self._lock:
             self._is_gone = True
 
@@ -185,7 +179,7 @@ class RobotScene:
         return handles
 
     def update(self, robot: Robot, poses: Mapping[str, Pose]) -> None:
-        """Put every frame where it is in the root of its tree."""
+        """Move every frame to its pose in the root of its tree."""
         for frame, body in self._bodies.items():
             if poses[frame] != self._at.get(frame):
                 body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
@@ -229,7 +223,7 @@ class RobotScene:
                 )
 
     def add_grid(self, poses: Mapping[str, Pose]) -> Bounds:
-        """Draw a grid below the robot; return the bounds of all that is shown."""
+        """Draw a grid below the robot; return the bounds of everything shown."""
         bodies = [
             (poses[frame] @ Pose(xyz)).xyz
             for frame, corners in self._corners.items()
@@ -250,7 +244,7 @@ class RobotScene:
         return bounds
 
     def measure(self, frames: tuple[str, ...]) -> None:
-        """Draw a line between two frames, or none."""
+        """Draw a line between two frames, or remove it."""
         self._measured = frames
         self._draw_measured()
 
@@ -278,7 +272,7 @@ class RobotScene:
         self.fields.hide(self._hidden)
 
     def select(self, frame: str) -> None:
-        """Draw the axes of a frame larger than those of all others, with its name."""
+        """Draw the axes of a frame larger than all others, with its name."""
         self._selected = frame
         self._axes.batched_scales = self._scales()
         self._label()
@@ -291,7 +285,7 @@ class RobotScene:
         return np.fromiter(sizes, np.float32)
 
     def name_all(self, *, visible: bool) -> None:
-        """Write the names of all frames next to them, or that of the selected one only."""
+        """Show the names of all frames next to them, or only that of the selected frame."""
         self._names_all = visible
         self._label()
 
@@ -326,7 +320,7 @@ class RobotScene:
 
 
 class Ghosts:
-    """Bodies and axes where a robot's file has frames that are elsewhere."""
+    """Bodies and axes at the expected poses of frames that are elsewhere."""
 
     def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
         self._scene = scene
@@ -335,7 +329,7 @@ class Ghosts:
         self._shown: dict[str, Any] = {}
 
     def show(self, poses: Mapping[str, Pose]) -> None:
-        """Show these frames, by their poses in the roots of their trees, and no others."""
+        """Show only these frames, at their poses in the roots of their trees."""
         for frame in self._shown.keys() - poses.keys():
             self._shown.pop(frame).remove()
         for frame, name in self._names.items():

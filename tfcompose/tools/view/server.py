@@ -1,7 +1,4 @@
-"""Server of the browser view.
-
-It admits only windows that know its token, and only messages of viser's.
-"""
+"""Server of the browser view: it admits only windows with its token, and only viser's messages."""
 
 from __future__ import annotations
 
@@ -35,18 +32,17 @@ _LOGGER.addFilter(lambda record: record.msg != "opening handshake failed")
 
 
 def new_token() -> str:
-    """Return a token that nobody can guess, as it stands in an address."""
+    """Return an unguessable token that is valid in a URL."""
     return secrets.token_urlsafe(_TOKEN_BYTES)
 
 
 def start_server(host: str, port: int, name: str, token: str) -> viser.ViserServer:
     """Return a server at a free port; 0 takes any.
 
-    Page and websocket are for those that know the ``token``: other users of the machine, pages of
-    other sites and programs that scan ports get 403 and nothing about the robot. The token is in
-    the address of the page, ``?token=``, and then in a cookie, since viser's page opens its
-    websocket without a query. viser has no setting for that, so it starts with what websockets
-    has.
+    Page and websocket require the ``token``: other users of the machine, pages of other sites and
+    port scanners get 403 and nothing about the robot. The token is in the address of the page,
+    ``?token=``, and then in a cookie, because viser's page opens its websocket without a query.
+    viser has no setting for this, so it is started with a replacement for websockets' ``serve``.
     """
     serve = websockets.asyncio.server.serve
 
@@ -64,7 +60,7 @@ def start_server(host: str, port: int, name: str, token: str) -> viser.ViserServ
 
 
 def stop_server(server: viser.ViserServer) -> None:
-    """End a server."""
+    """Stop a server."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 

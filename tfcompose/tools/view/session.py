@@ -1,7 +1,4 @@
-"""One robot file that is shown and edited.
-
-Poses that were moved, what undoes them, and how they are saved.
-"""
+"""One robot file that is shown and edited: moved poses, undo, and saving."""
 
 from __future__ import annotations
 
@@ -78,9 +75,9 @@ class Session:
         return Session(self.texts, self.compiled, self.write, self.state)
 
     def read_again(self, read: Callable[[str], str]) -> tuple[dict[str, str], Compiled]:
-        """Return the files as they are now, and what they compile to.
+        """Return the current files and the result of compiling them.
 
-        No files where one cannot be read.
+        No files if one cannot be read.
         """
         try:
             texts = {file: read(file) for file in self.texts}
@@ -89,17 +86,17 @@ class Session:
             return {}, Compiled(None, error.findings)
 
     def accepts(self, state: Compiled) -> bool:
-        """Return whether files that changed can be shown.
+        """Return whether changed files can be shown.
 
-        They give a robot, and did not get wrong.
+        They must give a robot, and not add errors to a robot without errors.
         """
         got_worse = bool(state.errors and not self.state.errors)
         return state.robot is not None and bool(state.robot.frames) and not got_worse
 
     def replace(self, texts: Mapping[str, str], state: Compiled) -> None:
-        """Go on with files that changed on disk, and what they compile to.
+        """Continue with files that changed on disk, and the result of compiling them.
 
-        Moves of frames that are gone are lost.
+        Moves of removed frames are lost.
         """
         self.texts, self.state = texts, state
         frames = state.robot.frames if state.robot else {}
@@ -108,7 +105,7 @@ class Session:
         self._redo.clear()
 
     def mount(self, child: str) -> Mount:
-        """Return what the file gives of the edge above a frame; raises ImmovableError.
+        """Return the file's pose for the edge above a frame; raises ImmovableError.
 
         A frame inside a sensor moves with the sensor, unless the file gives its own pose.
         """
@@ -123,17 +120,17 @@ class Session:
         return mount
 
     def move(self, child: str, pose: Pose) -> None:
-        """Move the frame to a pose in its parent, which ``undo`` takes back."""
+        """Move the frame to a pose in its parent; ``undo`` reverts it."""
         self._undo.append(dict(self.moved))
         self._redo.clear()
         self.moved[child] = pose
 
     def undo(self) -> bool:
-        """Take back the last move; False if there is none."""
+        """Revert the last move; False if there is none."""
         return self._step(self._undo, self._redo)
 
     def redo(self) -> bool:
-        """Make the move again that was taken back; False if there is none."""
+        """Repeat the move that was reverted last; False if there is none."""
         return self._step(self._redo, self._undo)
 
     def _step(self, there: list[dict[str, Pose]], back: list[dict[str, Pose]]) -> bool:
@@ -144,7 +141,7 @@ class Session:
         return False
 
     def save(self) -> Saved:
-        """Write what was moved into the files where the values stand, if that brings no new error.
+        """Write the moved poses to the files that hold them, unless that adds an error.
 
         Raises:
             OSError: if a file cannot be written, or was changed meanwhile.

@@ -1,4 +1,4 @@
-"""The triangles of shapes, few enough for a browser."""
+"""The triangles of shapes, reduced for a browser."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ MOST_TRIANGLES = 20_000
 def mesh_of(shape: Shape) -> Any:
     """Return the triangles of a shape in its own frame, a ``trimesh.Trimesh`` in metres.
 
-    A mesh file with more than ``MOST_TRIANGLES`` is decimated to these (quadric error metrics,
-    Garland and Heckbert 1997). None: the file is not there or cannot be read.
+    A mesh file with more than ``MOST_TRIANGLES`` is decimated to that number (quadric error
+    metrics, Garland and Heckbert 1997). None: the file is missing or cannot be read.
     """
     size = shape.size
     if shape.kind == "box":

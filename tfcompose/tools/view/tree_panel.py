@@ -1,9 +1,7 @@
-"""The panel of frames, at the left of the scene.
+"""The panel of frames, left of the scene: a tree to search, select, open, close and hide.
 
-A tree to search, select, open and close, and hide parts of.
-
-A control of viser for each of a thousand frames would take seconds. The tree is one element of
-HTML; what is clicked in it comes back as the text of a field below it, which is not shown.
+A viser control for each of a thousand frames would take seconds, so the tree is one HTML element.
+Clicks in it come back as the text of a hidden field below it.
 """
 
 from __future__ import annotations
@@ -104,7 +102,7 @@ _NO_OWNER = (134, 142, 150)
 
 
 class TreePanel:
-    """Shows a robot's frames as a tree, and keeps choices in ``choices``.
+    """Shows a robot's frames as a tree, and keeps the user's choices in ``choices``.
 
     Args:
         gui: where it is shown.
@@ -146,15 +144,15 @@ class TreePanel:
 
     @property
     def hidden(self) -> set[str]:
-        """The frames that are hidden."""
+        """The hidden frames."""
         return self.tree.hidden_frames(self._choices.is_shown)
 
     def on_select(self, call: Callable[[], None]) -> None:
-        """Call this when another frame is selected."""
+        """Call this function when another frame is selected."""
         self._on_select.append(call)
 
     def on_show(self, call: Callable[[], None]) -> None:
-        """Call this when frames are hidden, or shown again."""
+        """Call this function when frames are hidden or shown."""
         self._on_show.append(call)
 
     def select(self, frame: str) -> None:
@@ -167,9 +165,9 @@ class TreePanel:
             call()
 
     def search(self, search: str) -> None:
-        """Show the frames with these words in their names and all above them.
+        """Show the frames with these words in their names, and all frames above them.
 
-        Select the one that is meant, if any.
+        Select the intended one, if any.
         """
         with self._lock:
             self._choices.search = search
@@ -182,7 +180,7 @@ class TreePanel:
             self.select(frame)
 
     def show(self, frame: str, *, shown: bool) -> None:
-        """Show or hide a frame with all below it."""
+        """Show or hide a frame with all frames below it."""
         self._show(self.tree.show(frame, self._choices.is_shown, shown=shown))
 
     def _show(self, is_shown: dict[str, bool]) -> None:
@@ -193,14 +191,14 @@ class TreePanel:
             call()
 
     def mark(self, wrong: frozenset[str]) -> None:
-        """Have those frames red of whose edges something is wrong."""
+        """Mark frames red whose edges have errors."""
         with self._lock:
             if wrong != self._wrong:
                 self._wrong = wrong
                 self._refresh()
 
     def mark_moved(self, moved: frozenset[str]) -> None:
-        """Have a dot after those frames that were moved and are not saved."""
+        """Mark frames with a dot that were moved and are not saved."""
         with self._lock:
             if moved != self._moved:
                 self._moved = moved

@@ -91,7 +91,7 @@ def _plan_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sessi
 
 
 def plan_of_session(session: Session) -> Plan:
-    """Return what the session's robot publishes.
+    """Return the plan of the session's robot.
 
     Raises:
         SystemExit: after printing the errors for which it has no plan.

@@ -1,9 +1,7 @@
-"""Windows of browsers on one robot.
+"""Browser windows on one robot, each with its own panel, selection, joints and unsaved moves.
 
-Each has a panel, a selection, joints and unsaved moves of its own.
-
-All of them show the same files. What one saves the others show, and a pose that one has moved and
-another one saved is said before it is saved again.
+All of them show the same files. A save in one appears in the others. If one window has moved a
+pose that another has saved, it reports that before it saves.
 """
 
 from __future__ import annotations
@@ -57,8 +55,8 @@ class SceneSource:
 class Windows:
     """Makes a panel for each window that connects to a server, and reloads all of them.
 
-    A window that is opened goes on where one ended that was closed: browsers close and open the
-    connection when a page is reloaded, or a computer sleeps.
+    A new window continues the state of a closed one, because browsers reconnect when a page is
+    reloaded or a computer sleeps.
 
     Args:
         server: where windows connect.
@@ -89,19 +87,19 @@ class Windows:
 
     @property
     def panels(self) -> tuple[ReloadedPanel, ...]:
-        """Those of the windows that are open, in the order in which they were opened."""
+        """The panels of open windows, in the order of opening."""
         with self._lock:
             return tuple(self._open.values())
 
     def end(self) -> None:
-        """Let no panel move anything any more."""
+        """Stop all panels from moving anything."""
         for shown in self.panels:
             shown.panel.end()
 
     def reload(self) -> bool:
         """Read the files again if they have changed, and show them in all windows.
 
-        Return whether there is another robot.
+        Return whether there is a new robot.
         """
         with self._lock:
             if not self.files.differ():
@@ -122,7 +120,7 @@ class Windows:
             session.replace(texts, state)
 
     def add(self, place: viser.ViserServer | viser.ClientHandle, number: int) -> None:
-        """Make a panel for the window with this number, in its place."""
+        """Make a panel for the window with this number, and register it."""
         with self._lock:
             session, choices = self._left.pop() if self._left else (self.session.fork(), None)
             shown = ReloadedPanel(

@@ -30,7 +30,7 @@ Corners = tuple["Vector", "Vector"]
 _MOST_BYTES = 100_000_000
 _HEAD, _COUNT, _TRIANGLE = 80, struct.Struct("<I"), struct.Struct("<12x9f2x")
 _BODY = _HEAD + _COUNT.size
-#: At most so many triangles of an STL are read, evenly spread.
+#: The largest number of triangles of an STL that are read, evenly spread.
 _MOST_TRIANGLES = 5_000
 _NUMBER = rb"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _STL_VERTEX = re.compile(rb"\bvertex\s+(%b)\s+(%b)\s+(%b)" % (_NUMBER, _NUMBER, _NUMBER))

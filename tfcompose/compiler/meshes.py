@@ -24,7 +24,7 @@ def read_mesh(path: str, scale: Vector) -> Any:
     up_axis.
 
     Raises:
-        Exception: whatever a reader raises for a file that is no mesh.
+        Exception: any exception of a reader, for a file that is no mesh.
     """
     mesh: Any = trimesh.load(path, force="mesh")
     unit = _collada_unit(path)

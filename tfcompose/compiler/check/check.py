@@ -118,7 +118,7 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
 def _at_shared_values(findings: list[Finding]) -> list[Finding]:
     """Return one finding for a value that several entries share through a YAML anchor.
 
-    The others stand in its notes.
+    Its notes have the others.
     """
     by_place: dict[tuple[str, Span], list[Finding]] = {}
     single = []

@@ -39,7 +39,7 @@ def _limit(robot: Robot, code: str) -> float:
 
 @dataclass(slots=True)
 class _Views:
-    """What stands around the frames of a robot, their edges, and the views of its sensors."""
+    """Surroundings of a robot's frames, their edges, and the views of its sensors."""
 
     robot: Robot
     around: Surroundings

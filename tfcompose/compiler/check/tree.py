@@ -274,6 +274,6 @@ def _trees(robot: Robot) -> dict[str, set[str]]:
 def _main_root(robot: Robot, grown: dict[str, set[str]]) -> str:
     """Return the root of the tree that holds the robot's base, or of the largest one.
 
-    Empty where there is none.
+    Empty if there is none.
     """
     return max(grown, key=lambda root: (robot.base in grown[root], len(grown[root])), default="")

@@ -117,7 +117,7 @@ def _block(forest: Forest, flat: Layout, child: str) -> _Block:
 
 
 def _split(blocks: Sequence[_Block], count: int) -> list[list[_Block]]:
-    """Return the blocks in order, in at most so many columns, the tallest as low as possible."""
+    """Return the blocks in order, in at most this many columns, the tallest as low as possible."""
     low, high = max(block.height for block in blocks), sum(block.height for block in blocks)
     while high - low > 1:
         middle = (low + high) / 2

@@ -108,7 +108,7 @@ def _names(process: Process, robot: Robot) -> list[str]:
     return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]
 
 
-#: What JSON lets stand in a text and YAML takes for the end of a line, or does not allow at all.
+#: Characters that JSON allows in a text and YAML reads as the end of a line, or forbids.
 _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
@@ -194,7 +194,7 @@ def _mapping(values: dict[str, Any], indent: str) -> list[str]:
     return lines
 
 
-#: A word that YAML takes for one, wherever it stands.
+#: A word that YAML reads as one plain word in any place.
 _PLAIN = re.compile(r"[A-Za-z0-9_.+-]+")
 
 

@@ -82,7 +82,7 @@ def _needed_processes(robot: Robot) -> list[Process]:
 
     ``joints`` where joints move, else ``static`` at least.
 
-    That holds for the robot, and for each part that is a robot of its own.
+    That holds for the robot, and for each part that is a separate robot.
     """
     owners = {edge.owner for edge in robot.edges}
     idle = {

@@ -41,7 +41,7 @@ class _Body(PosedShape):
 
 
 class _Group:
-    """Frames that are fixed to each other, and what stands still there.
+    """Frames that are fixed to each other, and the bodies on them.
 
     ``poses`` are in the first of them.
     """

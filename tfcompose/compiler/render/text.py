@@ -26,7 +26,7 @@ _LONGEST_LINE = 160
 _LONGEST_MESSAGE = 1000
 
 
-#: Returns the address of a code's page; empty: there is none.
+#: Returns the address of a code's page; empty: it has none.
 CodeAddress = Callable[[str], str]
 
 

@@ -70,7 +70,7 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
 
 
 def _fit_rows(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:
-    """Return the rows as lines of at most so many columns, where names are no longer than that."""
+    """Return the rows as lines of at most this many columns, if names fit."""
     for kinds in ({"static", "joints", "dynamic"}, {"dynamic"}):
         facts = [_facts(edge, kinds) for _, _, edge in rows]
         drawing = [(lines, name, some) for (lines, name, _), some in zip(rows, facts, strict=True)]

@@ -60,7 +60,7 @@ class _Files:
     _known: dict[tuple[str, str], CalibrationFile] = field(default_factory=dict)
 
     def get(self, named: str, span: Span, form: str = "auto") -> CalibrationFile:
-        """Return what the file says; what is wrong with it is said once."""
+        """Return the file's entries; its faults are reported once."""
         path = find_path(named, span)
         if (path, form) not in self._known:
             self._known[path, form] = self._load(path, span, form)

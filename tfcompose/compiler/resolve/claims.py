@@ -102,7 +102,7 @@ class _Claims:
         return edge
 
     def _node(self, process: Process, node: Node) -> Claimant | None:
-        """Return what is known of a node and its parameters, or None where nothing is."""
+        """Return the known facts about a node and its parameters, or None."""
         declared = self.spec.processes[process.name]
         inner = declared.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
         name = (

@@ -52,7 +52,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     """Return the robot of a part that is a URDF or xacro file.
 
     Raises:
-        RejectedError: if the file is not there, is none, or xacro refuses it.
+        RejectedError: if the file is missing or invalid, or xacro refuses it.
     """
     spec = part.declared
     key = "urdf" if spec.urdf is not None else "xacro"
@@ -258,7 +258,7 @@ def _word(value: Any) -> str:
 
 
 def _own(part: PartEntry) -> tuple[Process, ...]:
-    """Return the publishers of a part that is a robot of its own."""
+    """Return the publishers of a part that is a separate robot."""
     settings: RosSettings = part.settings
     remap = topics_below(settings.namespace, part.isolate)
     return tuple(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.robot import PartSpec, RobotSpec
     from tfcompose.spec.load import Path, Source
 
-#: What may stand in front of names so that they can be looked up.
+#: Valid prefixes of names that are looked up.
 _PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")
 
 
@@ -144,7 +144,7 @@ class PartEntry:
         return Joined(self.name, self.declared, again, self._root(robot, names), shared)
 
     def _subtree(self, robot: Robot, root: str) -> Robot:
-        """Return what is below ``root``."""
+        """Return the robot below ``root``."""
         if root not in robot.frames:
             if robot.excuses(root):
                 raise RejectedError([])

@@ -206,7 +206,7 @@ def decide_options(
 
 
 def _as_text(value: Any) -> Any:
-    """Return what stands for a variant's name: a number or true as it is written."""
+    """Return the value for a variant's name: a number or true as written."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, (int, float)) else value
@@ -300,7 +300,7 @@ class Library:
         """Return the preset's contents, laid over the preset that it extends.
 
         Raises:
-            KeyError: if there is none of that name.
+            KeyError: if no preset has that name.
             RejectedError: if it, or what it extends, is no preset.
         """
         if name not in self._sources:
@@ -315,7 +315,7 @@ class Library:
         """Return the preset; ``choices`` are the options that lay a variant over it.
 
         Raises:
-            KeyError: if there is none of that name.
+            KeyError: if no preset has that name.
             RejectedError: if the preset itself is wrong.
         """
         options = tuple(sorted((choices or {}).items()))
@@ -352,7 +352,7 @@ class Library:
         return lay_over(without(below, "extends"), own, is_overlay=False, of=PresetSpec)
 
     def _later(self, file: str) -> str | None:
-        """Return the file of the preset that stands behind this file's, under the same name."""
+        """Return the preset file of the same name that this file shadows."""
         folder, name = _split(file)
         behind = (*self.folders, *self.storage.packages())
         return self._find(name, behind[behind.index(folder) + 1 :])
@@ -399,7 +399,7 @@ def node_preset(name: str) -> NodePresetSpec:
     """Return the preset of this name, or of PACKAGE/NAME.
 
     Raises:
-        KeyError: if there is none of that name.
+        KeyError: if no preset has that name.
         RejectedError: if the preset itself is wrong.
     """
     package, _, short = name.rpartition("/")

@@ -536,7 +536,7 @@ def _usual(declared: ProcessSpec) -> str | None:
 
 
 def _run_of(declared: ProcessSpec) -> Run | None:
-    """Return what starts a process: what is written, completed by its node's preset."""
+    """Return the start of a process as written, completed by its node's preset."""
     run, preset = declared.run, preset_of(declared.node)
     if run and run.is_startable:
         return run

@@ -148,7 +148,7 @@ class _Mounting:
         return Pose(xyz, turned or rotation or Pose().quat_xyzw), []
 
     def report_unknown(self) -> Iterator[Finding]:
-        """Yield a finding for the frames whose poses nobody knows, with what to write."""
+        """Yield a finding for the frames of unknown pose, with the keys to write."""
         if self.unknown:
             sensor, first = self.sensor, next(iter(self.unknown))
             *others, last = self.unknown

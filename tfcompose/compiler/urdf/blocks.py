@@ -32,7 +32,7 @@ _SECTIONS = {"link": "links", "joint": "joints", "robot": "include"}
 _INNER = frozenset(
     {"visual", "collision", "inertial", "origin", "geometry", "limit", "mimic", "axis", "plugin"}
 )
-#: At most so many joints are named where one is wrong.
+#: The largest number of joints that a finding about a wrong one names.
 _MOST_NAMED = 8
 _SUBSTITUTION = re.compile(
     r"\$\((?:find|find-pkg-share|arg|var|env|optenv|eval|dirname|cwd)\b[^()\n<>]*\)"

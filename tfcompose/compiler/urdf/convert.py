@@ -164,7 +164,7 @@ def _source_numbers(root: Element) -> Iterator[SourceNumbers]:
 def _numbers_of(
     element: Element | None, path: tuple[str, str], names: tuple[str, ...]
 ) -> Iterator[SourceNumbers]:
-    """Yield the numbers of an element's attributes; what is no number is a finding already."""
+    """Yield the numbers of an element's attributes; other values are findings already."""
     if element is None:
         return
     for name in names:

@@ -44,7 +44,7 @@ _NAMED = (
 #: So many words of an expression are searched for: each begin in a file is tried with all.
 _MOST_WORDS = 20
 _WORD = re.compile(r"""["']?(\w+)["']?""")
-#: At most so many of the macros around an error are named.
+#: The largest number of macros around an error that are named.
 _MOST_MACROS = 5
 #: Files that are read, and bytes of each.
 _MOST_FILES, _MOST_BYTES = 10_000, 16_000_000

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 FAR_M = FAR_RAD = 1e-11
 #: Moments are written with 12 digits.
 FAR_MOMENT = 1e-11
-#: Where the moments (xx, xy, xz, yy, yz, zz) stand in the tensor.
+#: Indices of the moments (xx, xy, xz, yy, yz, zz) in the tensor.
 _MOMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 

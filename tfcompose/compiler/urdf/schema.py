@@ -271,7 +271,7 @@ def version_of(root: Element, values: AttributeReader) -> tuple[int, ...]:
 
 
 def _advice(text: str, count: int) -> str:
-    """Return what to write for what is not so many numbers."""
+    """Return advice for a text that is not this many numbers."""
     if "${" in text or "$(" in text:
         return "xacro was not expanded here: use the .xacro file"
     if "," in text:

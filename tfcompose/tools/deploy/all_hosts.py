@@ -117,7 +117,7 @@ async def _print_output(host: ConnectedHost, argv: list[str], printer: _HostPrin
 
 
 def _object(line: str) -> dict[str, Any]:
-    """Return the object that a line is, empty for a line that is none."""
+    """Return the JSON object on a line, empty for other lines."""
     try:
         found = json.loads(line)
     except ValueError:

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
     from tfcompose.model.plan import PlanHost
 
-#: How long a host may take to be reached, and to answer what is no long work, in seconds.
+#: The time limits in seconds to reach a host, and for its answer to a short request.
 CONNECT_S, ANSWER_S = 10.0, 180.0
-#: A connection is lost when a host has not answered so many times, so many seconds apart.
+#: The interval of keepalives in seconds, and the number of missed ones that ends a connection.
 ALIVE_EVERY_S, ALIVE_MISSES = 2.0, 3
-#: The clock is read so often; the answer that came quickest is taken.
+#: The number of clock readings. The quickest answer is used.
 CLOCK_READINGS = 5
 #: What Python is started with: it runs as much of its input as the first line says.
 START = (
@@ -125,7 +125,7 @@ class ConnectedHost:
         return answer["answer"]
 
     async def _answer(self) -> dict[str, Any] | None:
-        """Return the next answer, None at the end; what the login prints before is none."""
+        """Return the next answer, None at the end; output of the login is skipped."""
         line = b""
         while (
             part := await self._process.stdout.readline()

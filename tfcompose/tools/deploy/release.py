@@ -134,7 +134,7 @@ def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
     Files keep their relative places, so that a map finds its image and a mesh its textures.
 
     Raises:
-        RejectedError: with what is named and cannot be copied.
+        RejectedError: with each named file that cannot be copied.
     """
     top = Path.cwd().as_posix()
     draft = _Packing(top=top)

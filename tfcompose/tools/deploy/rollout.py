@@ -417,9 +417,9 @@ class Rollout:
         return [edge.name for edge in plan.edges if self.target.is_complete or edge.owner in own]
 
     def _missing(self, share: Share, state: dict[str, Any]) -> list[Finding]:
-        """Return what is not as it has to be on a host, as its launcher says.
+        """Return findings about processes and edges of a host, from its launcher.
 
-        For some of the hosts, of theirs.
+        If the target is only some of the hosts, only theirs.
         """
         plan, robot, span = self.target.plan, state["robot"], share.host.span
         notes = [Note(line) for line in state["lines"]]

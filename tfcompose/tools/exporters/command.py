@@ -172,7 +172,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
 def _export(
     plan: Plan, file: Path, folder: Path, arguments: Namespace
 ) -> tuple[tuple[File, ...], list[str]]:
-    """Return the files, and what is not as with ``up``."""
+    """Return the files, and the differences from ``up``."""
     from tfcompose.tools.exporters.supervisors import Machine
 
     relative = Path(os.path.relpath(file.parent, folder)).as_posix()

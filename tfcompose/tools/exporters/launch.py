@@ -793,7 +793,7 @@ def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
     return argv[:at], kept
 
 
-#: What a word of the plan stands for in the launch file.
+#: The launch file's value for a word of the plan.
 _WORDS = {
     "${build_dir}": "str(BUILD)",
     "${params_file}": "str({file})",

@@ -199,7 +199,7 @@ class _Dumper(yaml.SafeDumper):
     """Quotes each string that some reader of YAML, 1.1 or 1.2, could take for something else."""
 
     def ignore_aliases(self, data: object) -> bool:
-        """Write what stands twice twice."""
+        """Write repeated values in full, without YAML aliases."""
         del data
         return True
 

@@ -163,7 +163,7 @@ class _LaunchImport:
     def finish(self, decided: list[str]) -> None:
         """Add what depends on all records.
 
-        ``decided`` are arguments whose values stand in what was added.
+        ``decided`` are arguments whose values are fixed in the added entries.
         """
         one_clock(self.draft)
         self._args({*decided, *self._read})

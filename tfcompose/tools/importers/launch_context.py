@@ -20,7 +20,7 @@ from tfcompose.tools.importers.launch_records import FailedError, LaunchRecordin
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-#: What is kept of the context with what is visited later.
+#: Attributes of the context that are kept for later visits.
 _SCOPE = ("params", "conditions", "whens", "period_s", "after", "depth")
 #: How deep launch files include each other.
 _DEEPEST = 30

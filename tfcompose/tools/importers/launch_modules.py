@@ -135,7 +135,7 @@ class _NotInstalled(_Finder):
 
 
 def _is_from_launch_file() -> bool:
-    """Return whether a launch file itself imports what is looked for."""
+    """Return whether a launch file itself imports the module."""
     frame: Any = sys._getframe(2)  # noqa: SLF001 (CPython's only way)
     while frame is not None:
         name = frame.f_code.co_filename

@@ -99,7 +99,7 @@ def _in_robot(root: Element, robot: Robot) -> Iterator[str]:
 
 
 def _in_element(element: Element, colours: frozenset[str]) -> Iterator[str]:
-    """Yield what is in a link or joint and has no place."""
+    """Yield notes about contents of a link or joint that a robot file cannot hold."""
     if element.tag == "joint" and element.attributes.get("type") == "fixed":
         tags = [child.tag for child in element.children if child.tag in _OF_MOTION]
         yield from (f"the {tag} of a fixed joint" for tag in tags)
@@ -126,7 +126,7 @@ def _described_materials(root: Element) -> frozenset[str]:
 
 
 def _elements_in(element: Element) -> Iterator[Element]:
-    """Yield the element and those in it, but for what is other programs' business."""
+    """Yield the element and its descendants, without elements for other programs."""
     waiting = [element]
     while waiting:
         inner = waiting.pop()

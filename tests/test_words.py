@@ -266,6 +266,24 @@ def test_a_module_says_what_it_is_by_a_noun_or_a_verb() -> None:
     assert {path: word for path, word in beginnings.items() if word in NO_BEGINNINGS} == {}
 
 
+def test_fields_are_described_at_the_fields_and_not_in_the_docstring_of_their_class() -> None:
+    listing = {
+        f"{file.relative_to(ROOT)}: {node.name}": fields
+        for file in sorted(PACKAGE.rglob("*.py"))
+        for node in nodes_of(file)
+        if isinstance(node, ast.ClassDef) and len(fields := fields_in_docstring(node)) > 1
+    }
+    pair = {"parent", "child"}  # the ends of a pose in its definition
+    assert {name for name, fields in listing.items() if fields != pair} == set()
+
+
+def fields_in_docstring(node: ast.ClassDef) -> set[str]:
+    """Return the fields of a class that its docstring names."""
+    docstring = ast.get_docstring(node) or ""
+    fields = {ast.unparse(each.target) for each in node.body if isinstance(each, ast.AnnAssign)}
+    return {field for field in fields if f"``{field}``" in docstring}
+
+
 def faults(folder: str) -> Iterator[str]:
     """Yield file, line and name wherever a name contains a forbidden word."""
     for file in sorted((ROOT / folder).rglob("*.py")):

@@ -9,6 +9,7 @@ import sysconfig
 import venv
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -333,7 +334,7 @@ def test_rollback_returns_to_the_release_before(computers: Computers) -> None:
 def test_of_two_at_once_the_second_says_who_holds_the_hosts(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
-    first = deploying(computers, SILENT, "--timeout", "12")
+    first = deploying(computers, SILENT, "--timeout", "20")
     assert until(lambda: is_on_trial(computers, "rear"))
     second = deploy(computers, MOVED)
     assert (second.returncode, "TF915" in second.stderr, f"pid {first.pid}" in second.stderr) == (
@@ -343,6 +344,12 @@ def test_of_two_at_once_the_second_says_who_holds_the_hosts(computers: Computers
     ), second
     first.communicate(timeout=2 * TIMEOUT_S)
     assert (first.returncode, current(computers)) == (1, before)
+
+
+def events_in(file: Path) -> list[dict[str, Any]]:
+    """Return the events in the file so far, without a line that is still being written."""
+    lines = file.read_text("utf-8").splitlines(keepends=True)
+    return [json.loads(line) for line in lines if line.endswith("\n")]
 
 
 def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
@@ -366,14 +373,17 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
     assert {line.partition("|")[0].strip() for line in logs if "guard" in line} == set(NAMES)
     unknown = on_all("logs", "nobody")
     assert (unknown.returncode, unknown.stderr.count("no log of nobody")) == (1, 3), unknown
-    following = processes.start(
-        computers.in_office(
-            sys.executable, "-m", "tfcompose", "events", "--all-hosts", "--format", "json"
-        ),
-        env=computers.environment(),
-        cwd=computers.folder / "robot",
-        stdout=subprocess.PIPE,
-    )
+    seen = computers.folder / "events.jsonl"
+    with seen.open("w") as stream:
+        following = processes.start(
+            computers.in_office(
+                sys.executable, "-m", "tfcompose", "events", "--all-hosts", "--format", "json"
+            ),
+            env=computers.environment(),
+            cwd=computers.folder / "robot",
+            stdout=stream,
+        )
+    assert until(lambda: {event["host"] for event in events_in(seen)} == set(NAMES))
     down = on_all("down")
     assert (
         down.returncode,
@@ -382,12 +392,8 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
         0,
         sorted(NAMES),
     ), down
-    output, _ = following.communicate(timeout=TIMEOUT_S)
-    ended = {
-        event["host"]
-        for event in map(json.loads, output.splitlines())
-        if event["event"] == "Ended"
-    }
+    following.wait(TIMEOUT_S)
+    ended = {event["host"] for event in events_in(seen) if event["event"] == "Ended"}
     assert (following.returncode, ended) == (0, set(NAMES))
     assert on_all("ps", "--fail-on", "absent").returncode == 1
     assert deploy(computers, ROBOT).returncode == 0, "what is down is started again"

@@ -373,8 +373,8 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
     assert {line.partition("|")[0].strip() for line in logs if "guard" in line} == set(NAMES)
     unknown = on_all("logs", "nobody")
     assert (unknown.returncode, unknown.stderr.count("no log of nobody")) == (1, 3), unknown
-    seen = computers.folder / "events.jsonl"
-    with seen.open("w") as stream:
+    heard = computers.folder / "events.jsonl"
+    with heard.open("w") as stream:
         following = processes.start(
             computers.in_office(
                 sys.executable, "-m", "tfcompose", "events", "--all-hosts", "--format", "json"
@@ -383,7 +383,7 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
             cwd=computers.folder / "robot",
             stdout=stream,
         )
-    assert until(lambda: {event["host"] for event in events_in(seen)} == set(NAMES))
+    assert until(lambda: {event["host"] for event in events_in(heard)} == set(NAMES))
     down = on_all("down")
     assert (
         down.returncode,

@@ -393,7 +393,7 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
         sorted(NAMES),
     ), down
     following.wait(TIMEOUT_S)
-    ended = {event["host"] for event in events_in(seen) if event["event"] == "Ended"}
+    ended = {event["host"] for event in events_in(heard) if event["event"] == "Ended"}
     assert (following.returncode, ended) == (0, set(NAMES))
     assert on_all("ps", "--fail-on", "absent").returncode == 1
     assert deploy(computers, ROBOT).returncode == 0, "what is down is started again"

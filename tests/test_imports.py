@@ -336,6 +336,7 @@ def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> No
             "robot_search",
             "schemas",
             "start_command",
+            "templates",
             "terminal",
             "tool_commands",
         )

@@ -3,12 +3,13 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.support import processes
 from tests.support.cli import tfcompose_in
-from tfcompose.cli.commands.init import FOLDER, TEMPLATES
+from tfcompose.cli.templates import FOLDER, TEMPLATES
 from tfcompose.model.plan.file import read_plan
 
 
@@ -102,3 +103,20 @@ def test_a_folder_that_refuses_files_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     done = tfcompose_in(tmp_path, "init", "-o", "file/robot.yaml")
     assert (done.returncode, "file/robot.yaml" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
+def test_an_interrupted_init_leaves_no_file(
+    error: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    open_file = Path.open
+
+    def open_first(path: Path, *arguments: Any, **options: Any) -> Any:
+        if path.name == "cart.yaml" and arguments == ("x",):
+            raise error
+        return open_file(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "open", open_first)
+    done = tfcompose_in(tmp_path, "init", "fleet")
+    assert done.returncode == (130 if error is KeyboardInterrupt else 2)
+    assert not list(tmp_path.iterdir())

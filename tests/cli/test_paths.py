@@ -133,7 +133,7 @@ ASKING = frozenset(
 #: Modules that may, and why.
 EXCEPTIONS = {
     "cli/documentation.py": "its own data",
-    "cli/commands/init.py": "its own data",
+    "cli/templates.py": "its own data",
     "cli/compiling.py": "folders of presets and of the workspace, whose errors it takes for none",
     "cli/runs.py": "the run folder, of this user",
     "cli/writing.py": "the folder that it writes, under an except",
@@ -144,6 +144,7 @@ EXCEPTIONS = {
     "tools/deploy/command.py": "wheels, as above",
     "tools/docs/option.py": "the folder that it writes, under an except",
     "tools/docs/site.py": "its own data",
+    "tools/ros2/package.py": "its own data",
     "tools/view/page.py": "its own data",
     "tools/importers/launch_process.py": "runs confined, and answers errors",
     "tools/importers/launch_moveit.py": "runs confined",

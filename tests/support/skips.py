@@ -27,6 +27,9 @@ NEEDS_STOCK_ROS = {
     "tests/tools/importers/test_confined_launch.py": _LAUNCH,
     "tests/tools/importers/test_exported.py": _LAUNCH,
     "tests/tools/ros2/test_colcon.py": "colcon and the ros2 command come with a distribution only",
+    "tests/tools/ros2/test_init_package_ros.py": (
+        "colcon and the ros2 command come with a distribution only"
+    ),
     "tests/tools/ros2/test_launch_ros.py": "ros2 launch comes with a distribution only",
     "tests/tools/ros2/test_verb.py": "the ros2 command comes with a distribution only",
 }

@@ -100,6 +100,45 @@ def write_all(folder: Path, files: Sequence[File], earlier: Iterable[str] = ()) 
     _remove_stale(folder, [path for path in before if path not in now])
 
 
+def create_folder(folder: Path, files: Iterable[File]) -> None:
+    """Create a folder with these files, all or nothing; an empty folder may exist.
+
+    The files are first written to a hidden folder beside it, which becomes the folder at once.
+
+    Raises:
+        FileExistsError: if a file, or a folder that is not empty, has this name.
+        OSError: if the files cannot be written; nothing has changed.
+    """
+    made = [parent for parent in folder.parents if not exists(parent)]
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=".tfcompose-", dir=folder.parent))
+        try:
+            for file in files:
+                _write_to_disk(staging / "new" / file.path, file.text)
+            _rename_to_absent(staging / "new", folder)
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+    except BaseException:
+        for parent in made:
+            _remove_if_empty(parent)
+        raise
+
+
+def _rename_to_absent(new: Path, folder: Path) -> None:
+    """Rename a folder; an empty one of the new name is replaced.
+
+    Raises:
+        FileExistsError: if something else has the name.
+    """
+    try:
+        new.rename(folder)
+    except OSError as error:
+        if error.errno in {errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR, errno.EBUSY}:
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(folder)) from None
+        raise
+
+
 def _move(staging: Path, folder: Path, paths: list[str]) -> None:
     """Move the files into place, all or none.
 

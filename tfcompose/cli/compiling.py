@@ -37,6 +37,7 @@ from tfcompose.spec.load import load
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Mapping, Sequence
+    from datetime import date
 
     from tfcompose.compiler.urdf.inertia import Moments
     from tfcompose.compiler.urdf.packages import Packages
@@ -147,8 +148,10 @@ def disk_of(file: str, arguments: Namespace) -> Disk:
     return disk(trusts_files=arguments.trust, sources=[file])
 
 
-def inputs_of(arguments: Namespace) -> Given:
+def inputs_of(arguments: Namespace, day: date | None = None) -> Given:
     """Return the robot's inputs from command line and environment.
+
+    ``day`` is the one whose calibrations apply; None: those that still hold.
 
     Raises:
         SystemExit: after reporting wrong ROS arguments.
@@ -156,19 +159,21 @@ def inputs_of(arguments: Namespace) -> Given:
     args = {
         name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()
     }
-    return Given(args, os.environ, ros_arguments(getattr(arguments, "ros_args", ())))
+    return Given(args, os.environ, ros_arguments(getattr(arguments, "ros_args", ())), day)
 
 
-def compile_or_exit(file: str, arguments: Namespace) -> Robot:
-    """Return the robot, which has no errors; warnings are printed.
+def compile_or_exit(file: str, arguments: Namespace, day: date | None = None) -> Robot:
+    """Return the robot on the day, which has no errors; warnings are printed.
 
     Raises:
         SystemExit: after printing its errors.
     """
-    return compile_without_errors(file, arguments)[0]
+    return compile_without_errors(file, arguments, day)[0]
 
 
-def compile_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Compiled]:
+def compile_without_errors(
+    file: str, arguments: Namespace, day: date | None = None
+) -> tuple[Robot, Compiled]:
     """Return the robot and its compiled files; print warnings.
 
     Raises:
@@ -184,7 +189,7 @@ def compile_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Comp
             overlays=overlays,
             read=read_text,
             disk=disk_of(file, arguments),
-            given=inputs_of(arguments),
+            given=inputs_of(arguments, day),
         )
     except RejectedError as error:
         reject(error.findings)

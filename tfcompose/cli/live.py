@@ -12,7 +12,7 @@ from tfcompose.foundation.signals import Stop
 from tfcompose.guard.verdict.setup import elsewhere_help, settings_text
 from tfcompose.model.plan import RosSettings
 from tfcompose.model.plan.topics import parts_of, topics_below
-from tfcompose.tf.bags import BagError, BagFeed, missing_rosbags
+from tfcompose.tf.bags import BagError, BagFeed, Recording, missing_rosbags
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 from tfcompose.tf.live.feed import follow
 from tfcompose.tf.ros.environment import (
@@ -25,6 +25,7 @@ from tfcompose.tf.ros.environment import (
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Iterable, Mapping, Sequence
+    from datetime import date
 
     from tfcompose.model.plan import Plan
     from tfcompose.tf.live.feed import Feed
@@ -56,7 +57,9 @@ def observe_for(name: str, arguments: Namespace) -> tuple[Plan | None, dict[Topi
         SystemExit: after reporting unreadable input, a failed observation or conflicting options.
     """
     refuse_live_bag(arguments)
-    plan = expected_plan(arguments.file, arguments)[0] if arguments.file is not None else None
+    plan = None
+    if arguments.file is not None:
+        plan, _ = expected_plan(arguments.file, arguments, recording_day(arguments.bag))
     ros = plan.ros if plan else None
     pairs = list(parts_of(plan)) if plan else []
     pairs = pairs or [topics_below(ros.namespace if ros else arguments.namespace)]
@@ -78,6 +81,15 @@ def from_bag(read: Callable[[], T]) -> T:
         return read()
     except BagError as error:
         reject([finding("TF907", str(error), None, help=error.help)], UNREADABLE)
+
+
+def recording_day(bag: str | None) -> date | None:
+    """Return the day, in UTC, on which the recording of a bag began; None without one.
+
+    Raises:
+        SystemExit: after reporting why the bag cannot be read.
+    """
+    return None if bag is None else from_bag(lambda: Recording(bag).first_day())
 
 
 def observe_topics(  # noqa: PLR0913 (all but two are named)

@@ -21,6 +21,7 @@ from tfcompose.model.variables import SETTLE
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from datetime import date
 
     from tfcompose.foundation.findings import Span
     from tfcompose.launcher.runtime_dir import RuntimeDir
@@ -79,10 +80,13 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
         )
 
 
-def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]]:
+def expected_plan(
+    file: str, arguments: Namespace, day: date | None = None
+) -> tuple[Plan, dict[str, Span]]:
     """Return the plan of a robot file, plan.json or folder, and the edges' places.
 
-    Places are by child; a built plan has none.
+    Places are by child; a built plan has none. ``day`` is the one whose calibrations apply; None:
+    those that still hold.
 
     Raises:
         SystemExit: after reporting unreadable files and errors.
@@ -94,7 +98,7 @@ def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span
     from tfcompose.cli.compiling import compile_or_exit
     from tfcompose.compiler.emit.plan import plan_of
 
-    robot = compile_or_exit(file, arguments).with_final_names()
+    robot = compile_or_exit(file, arguments, day).with_final_names()
     return plan_of(robot), {edge.child: edge.span for edge in robot.edges}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from datetime import datetime, timezone
 from importlib.util import find_spec
 from pathlib import Path
 from struct import Struct
@@ -20,6 +21,7 @@ from tfcompose.tf.tf2.pose_buffer import CACHE_NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from datetime import date
 
     from typing_extensions import Self
 
@@ -92,6 +94,25 @@ class Recording:
         self.end_ns = 0
         self._files = _files_at(Path(path))
         self._clock_ns: int | None = None
+
+    def first_day(self) -> date | None:
+        """Return the day, in UTC, of the first message; None: there are no messages.
+
+        Raises:
+            BagError: if it is not a bag, or damaged.
+        """
+        from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
+
+        for file in self._files:
+            try:
+                with Reader(file) as reader:
+                    if reader.message_count:
+                        return datetime.fromtimestamp(
+                            reader.start_time // _SECOND_NS, timezone.utc
+                        ).date()
+            except Exception as error:  # noqa: BLE001 (as for messages)
+                raise damage_error(str(file), error) from None
+        return None
 
     def messages(self, *pairs: Topics) -> Iterator[RecordedMessage]:
         """Yield the messages of the pairs of topics (moving, fixed) in recorded order.

@@ -1,6 +1,7 @@
 """Each format gives the pose that scipy computes, in the direction that its tool means."""
 
 import math
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.foundation.findings import Span
 from tfcompose.foundation.geometry import Pose, angle_between
 from tfcompose.model.robot import Edge
+from tfcompose.spec.language import Given
 from tfcompose.spec.language.calibration import read_calibration
 
 #: A robot of two metres, so that no measured pose is outside of it; every sensor is inside.
@@ -339,6 +341,72 @@ def test_a_complete_file_is_applied_and_its_chain_too() -> None:
     assert mount
     assert (mount.parent, mount.child, mount.span.line) == ("kit", "camera_link", 10)
     assert_same(mount.pose, Pose((0.1, -0.34, 0.56), MEASURED.quat_xyzw))
+
+
+#: Three calibrations of one mount, each 1 cm further along x; none holds on 2026-05-01.
+DATED = (
+    "[{file: a.yaml, valid: {to: 2026-03-01}},"
+    " {file: b.yaml, valid: {from: 2026-03-02, to: 2026-04-30}},"
+    " {file: c.yaml, valid: {from: 2026-05-02}}]"
+)
+MOUNTS = {
+    "of the mount": f"frames: {{lens: {{parent: base_link, calibration: {DATED}}}}}\n",
+    "of the robot": f"calibrations: {DATED}\nframes: {{lens: {{parent: base_link}}}}\n",
+}
+
+
+def compiled_on(day: str | None, robot: str) -> Compiled:
+    texts = {
+        f"{name}.yaml": autoware().replace("0.12", x)
+        for name, x in zip("abc", ("0.12", "0.13", "0.14"), strict=True)
+    }
+    inputs = Given(day=date.fromisoformat(day) if day else None)
+    return compile_robot(HEAD + robot, "r.yaml", library(), read=reader(texts), given=inputs)
+
+
+@pytest.mark.parametrize("robot", MOUNTS.values(), ids=MOUNTS)
+@pytest.mark.parametrize(
+    ("day", "x"),
+    [
+        (None, 0.14),
+        ("1970-01-01", 0.12),
+        ("2026-03-01", 0.12),
+        ("2026-03-02", 0.13),
+        ("2026-05-02", 0.14),
+    ],
+)
+def test_the_calibration_of_the_day_is_taken(robot: str, day: str | None, x: float) -> None:
+    assert edge_of(compiled_on(day, robot), "lens").pose.xyz[0] == x
+
+
+@pytest.mark.parametrize("robot", MOUNTS.values(), ids=MOUNTS)
+@pytest.mark.parametrize(
+    ("day", "old", "new"),
+    [("2026-05-01", "", ""), (None, "{from: 2026-05-02}", "{to: 2026-06-01}")],
+)
+def test_a_day_without_a_calibration_is_a_finding(
+    robot: str, day: str | None, old: str, new: str
+) -> None:
+    findings = compiled_on(day, robot.replace(old, new) if old else robot).findings
+    column = robot.splitlines()[0].index("a.yaml") + 1
+    assert [(each.code, str(each.span)) for each in findings] == [("TF608", f"r.yaml:5:{column}")]
+
+
+@pytest.mark.parametrize(
+    ("calibrations", "code", "named"),
+    [
+        ("[a.yaml, b.yaml]", "TF613", "b.yaml"),
+        ("[{file: a.yaml, valid: {to: 2026-3-2}}, b.yaml]", "TF103", "2026-3-2"),
+        ("[{file: a.yaml, valid: {to: 20260302}}, b.yaml]", "TF103", "20260302"),
+        ("[{file: a.yaml, valid: {from: 2026-03-02, to: 2026-03-01}}]", "TF106", "{from"),
+        ("[{file: d.yaml, valid: {to: 2026-03-02}}, b.yaml]", "TF610", "d.yaml"),
+    ],
+)
+def test_wrong_days_are_findings(calibrations: str, code: str, named: str) -> None:
+    robot = f"frames: {{lens: {{parent: base_link, calibration: {calibrations}}}}}\n"
+    findings = compiled_on(None, robot).findings
+    place = f"r.yaml:5:{robot.index(named) + 1}"
+    assert [(each.code, str(each.span)) for each in findings] == [(code, place)]
 
 
 PROBLEMS = {

@@ -168,6 +168,26 @@ def test_fixed_edges_become_those_of_the_file_and_all_else_stays(folder: Path, k
         assert metadata[0][key] == metadata[1][key]
 
 
+def test_poses_are_those_of_the_calibration_of_the_recording_s_day(folder: Path) -> None:
+    """Recordings begin on 2023-11-14; the other calibration is that of today."""
+    for name, x in (("old", 0.25), ("new", 0.26)):
+        transform = f"{{x: {x}, y: 0, z: 0.3, roll: 0, pitch: 0, yaw: 0}}"
+        (folder / f"{name}.yaml").write_text(f"base_link: {{laser: {transform}}}\n", "utf-8")
+    files = (
+        "[{file: old.yaml, valid: {to: 2023-11-14}}, {file: new.yaml, valid: {from: 2023-11-15}}]"
+    )
+    (folder / "cart.yaml").write_text(
+        "tfcompose: 1\nrobot: cart\nlinks: {base_link: {}}\n"
+        f"frames: {{laser: {{parent: base_link, xyz: [0.24, 0, 0.3], calibration: {files}}}}}\n",
+        "utf-8",
+    )
+    write_bag(folder / "drive", RECORDED)
+    rebag(folder, "drive", "right")
+    laser = buffer_of(folder / "right").lookup_transform("base_link", "laser", 0).transform
+    assert laser.translation.x == 0.25
+    assert tfcompose_in(folder, "verify", "cart.yaml", "--bag", "right").returncode == 0
+
+
 def test_a_corrected_bag_has_nothing_more_to_correct(folder: Path) -> None:
     write_bag(folder / "drive", RECORDED)
     assert "off by" in rebag(folder, "drive", "--check", code=1)

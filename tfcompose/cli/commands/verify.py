@@ -64,7 +64,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
-    from tfcompose.cli.live import observe_topics, refuse_live_bag
+    from tfcompose.cli.live import observe_topics, recording_day, refuse_live_bag
     from tfcompose.cli.plans import expected_plan
     from tfcompose.guard.verdict.verify import verify
     from tfcompose.model.plan.topics import joint_states_topics, parts_of
@@ -72,7 +72,7 @@ def run(arguments: Namespace) -> int:
     refuse_live_bag(arguments)
     settle_duration(arguments, 5.0, is_live=not arguments.bag)
     plan, places = _running_plan(arguments) or expected_plan(
-        arguments.file or DEFAULT_FILE, arguments
+        arguments.file or DEFAULT_FILE, arguments, recording_day(arguments.bag)
     )
     other = other_plan(arguments, plan)
     # Programs get each missing edge; a robot without edges misses none.

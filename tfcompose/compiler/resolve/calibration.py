@@ -23,7 +23,7 @@ from tfcompose.foundation.findings import (
 )
 from tfcompose.model.robot import Calibration
 from tfcompose.spec.language.calibration import CalibrationFile, read_calibration, unreadable
-from tfcompose.spec.language.pose import CalibrationLimit, CalibrationSpec, MountKeys
+from tfcompose.spec.language.pose import CalibrationLimit, MountKeys
 from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.spec.language.calibration import CalibrationEntry
+    from tfcompose.spec.language.pose import CalibrationFileSpec, CalibrationSpec
     from tfcompose.spec.load import Path
 
     Reader = Callable[[str], str]
@@ -46,8 +47,7 @@ def measure(draft: Draft) -> Iterator[Finding]:
             work.inside.setdefault(group, set()).add(edge.child)
     for index in draft.keys:
         work.measure(index)
-    for position, name in enumerate(draft.spec.calibrations):
-        work.apply(name, draft.spec.span_of(("calibrations", position)))
+    work.apply_files()
     yield from (*work.files.findings, *work.findings)
 
 
@@ -126,14 +126,59 @@ class _Calibrations:
     def measure(self, index: int) -> None:
         """Apply an edge's own ``calibration``."""
         edge, keys = self.draft.edges[index], self.draft.keys[index]
-        declared = keys.calibration if isinstance(keys, MountKeys) else None
-        if declared is None:
+        if not isinstance(keys, MountKeys) or not keys.calibration:
             return
-        span = self.draft.spec.span_of((*edge.entry, "calibration", "file"))
-        file = self.files.get(declared.file, span, declared.format)
-        match = self._pick(index, declared, file, span)
-        if match:
-            self._take(index, match, file, declared, span)
+        path = (*edge.entry, "calibration")
+        valid = self._valid(keys.calibration, path)
+        if len(valid) > 1:
+            self._several_valid(edge.name, keys.calibration, valid, path)
+        for position, declared in enumerate(keys.calibration):
+            span = self._span(path, position)
+            file = self.files.get(declared.file, span, declared.format)
+            match = self._pick(index, declared, file, span)
+            if match and valid == [position]:
+                self._take(index, match, file, declared, span)
+
+    def _span(self, path: Path, position: int) -> Span:
+        """Return where a list names a file, or the entry that stands for a list of one."""
+        item = (*path, position)
+        spans = self.draft.spec.spans
+        return spans.span_of((*(item if spans.has(item) else path), "file"))
+
+    def _valid(self, declared: Sequence[CalibrationFileSpec], path: Path) -> list[int]:
+        """Return the positions of the calibrations that hold; there being none is a finding."""
+        validated = self.draft.validated
+        if any(refused[: len(path)] == path for refused in validated.refused):
+            return []
+        day = validated.given.day
+        valid = [at for at, calibration in enumerate(declared) if calibration.holds(day)]
+        if declared and not valid:
+            names = ", ".join(calibration.file for calibration in declared)
+            message = (
+                f"none of the calibrations is valid on {day}: {names}"
+                if day
+                else f"all calibrations have expired: {names}"
+            )
+            advice = (
+                "add the calibration of that day, or correct valid:"
+                if day
+                else "add a newer one, or remove to: from the one that still holds"
+            )
+            self.findings.append(finding("TF608", message, self._span(path, 0), help=advice))
+        return valid
+
+    def _several_valid(
+        self, name: str, declared: Sequence[CalibrationSpec], valid: Sequence[int], path: Path
+    ) -> None:
+        """Report that a mount has several calibrations for one day."""
+        first, second = valid[:2]
+        files = ", ".join(declared[position].file for position in valid)
+        day = self.draft.validated.given.day
+        message = f"{name} has several calibrations valid {f'on {day}' if day else 'now'}: {files}"
+        notes = [Note("the other one", self._span(path, first))]
+        advice = "end the older one: valid: {to: DAY}"
+        span = self._span(path, second)
+        self.findings.append(finding("TF613", message, span, help=advice, notes=notes))
 
     def _around(self, index: int) -> tuple[set[str], set[str]]:
         """Return the frame names that the edge's parent and child can have in its entry."""
@@ -239,9 +284,18 @@ class _Calibrations:
         )
         self.draft.edges[index] = replace(edge, calibration=calibration)
 
-    def apply(self, named: str, span: Span) -> None:
+    def apply_files(self) -> None:
+        """Apply every entry of the files under ``calibrations`` that hold."""
+        declared, path = self.draft.spec.calibrations, ("calibrations",)
+        valid = self._valid(declared, path)
+        for position, calibration in enumerate(declared):
+            span = self._span(path, position)
+            file = self.files.get(calibration.file, span)
+            if position in valid:
+                self._apply(file, span)
+
+    def _apply(self, file: CalibrationFile, span: Span) -> None:
         """Apply every entry of a file; one that nothing takes is a finding."""
-        file = self.files.get(named, span)
         for index in self.draft.keys:
             self._apply_to(index, file, span)
         self._report_unused(file, span)

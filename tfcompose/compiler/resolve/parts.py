@@ -87,7 +87,8 @@ def _validate_part(part: PartEntry, named: str, draft: Draft, read: Reader) -> V
         raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", span)])
     loaded = with_includes(load_named(read(file), file), read)
     draft.collected.notes.setdefault(file, []).append(_note(part))
-    inputs = Given(part.given_args(), draft.validated.given.environment)
+    holder = draft.validated.given
+    inputs = Given(part.given_args(), holder.environment, day=holder.day)
     source = compose(loaded, part.declared.profiles, given=inputs)
     validated = validate(part.overlay_on(source), None, inputs)
     part.findings += _useless(part, file, validated)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from datetime import date
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator
@@ -67,6 +68,8 @@ class Given:
     args: Mapping[str, GivenArg] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
     ros: RosArguments = field(default_factory=RosArguments)
+    #: The day, in UTC, whose calibrations apply; None: those that still hold.
+    day: date | None = None
 
 
 class ArgError(ValueError):

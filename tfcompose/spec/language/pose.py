@@ -7,11 +7,12 @@ What is written stays as it is: ``rotation`` and ``Posed.xyz`` are what it means
 
 import math
 from collections.abc import Iterator
+from datetime import date
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, Discriminator, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
-from typing_extensions import TypeAliasType
+from typing_extensions import Self, TypeAliasType
 
 from tfcompose.foundation.geometry import (
     Matrix,
@@ -28,12 +29,14 @@ from tfcompose.spec.language.spec import Checked, Entry, Spec, key, several
 from tfcompose.spec.language.values import (
     Axis,
     Boolean,
+    Day,
     InARow,
     Numbers,
     OneOrMore,
     Text,
     Texts,
     Xyz,
+    as_list,
     short,
 )
 from tfcompose.spec.load import Path
@@ -255,10 +258,52 @@ class CalibrationLimit(Spec):
     rot: Angle = key(math.radians(5), "the largest angle", "5 deg")
 
 
-class CalibrationSpec(Spec):
-    """A measured pose, in a file. The pose in the robot file is the nominal one."""
+class Validity(Checked):
+    """The days on which a calibration holds, the first and the last one included."""
+
+    from_: Day | None = Field(
+        None,
+        alias="from",
+        description="the first day; default: every day before",
+        examples=["2026-03-01"],
+    )
+    to: Day | None = key(
+        None, "the last day; default: it still holds; build and up use no others", "2026-06-30"
+    )
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Self:
+        if self.from_ and self.to and self.to < self.from_:
+            message = f"the last day, {self.to}, is before the first, {self.from_}"
+            raise invalid("TF106", message, "swap them")
+        return self
+
+    def has(self, day: date | None) -> bool:
+        """Return whether the day is one of them; without a day, whether they have no end."""
+        if day is None:
+            return self.to is None
+        return (self.from_ or day) <= day <= (self.to or day)
+
+
+class CalibrationFileSpec(Spec):
+    """A calibration file, and when it holds."""
 
     file: Text = key(..., "the file, relative to this file", "calibration/sensors.yaml")
+    valid: Validity | None = key(
+        None,
+        "the days on which it holds, in UTC; rebag and verify --bag take the calibrations of the"
+        " recording's day",
+        {"from": "2026-03-01", "to": "2026-06-30"},
+    )
+
+    def holds(self, day: date | None) -> bool:
+        """Return whether it holds on the day, or without one, whether it still holds."""
+        return self.valid is None or self.valid.has(day)
+
+
+class CalibrationSpec(CalibrationFileSpec):
+    """A measured pose, in a file. The pose in the robot file is the nominal one."""
+
     format: Literal["auto", CalibrationFormat] = key("auto", "the format of the file", "kalibr")
     parent: Text | None = key(
         None, "the parent in the calibration file; default: the parent of this frame", "tool0"
@@ -275,17 +320,32 @@ class CalibrationSpec(Spec):
     )
 
 
-Calibration = TypeAliasType(
-    "Calibration", Annotated[CalibrationSpec, short("file", CalibrationSpec)]
+_Calibration = Annotated[CalibrationSpec, short("file", CalibrationSpec)]
+#: One calibration, or those of different days.
+Calibrations = TypeAliasType(
+    "Calibrations",
+    Annotated[
+        tuple[_Calibration, ...],
+        BeforeValidator(as_list, _Calibration | tuple[_Calibration, ...]),
+    ],
+)
+_CalibrationFile = Annotated[CalibrationFileSpec, short("file", CalibrationFileSpec)]
+CalibrationFiles = TypeAliasType(
+    "CalibrationFiles",
+    Annotated[
+        tuple[_CalibrationFile, ...],
+        BeforeValidator(as_list, _CalibrationFile | tuple[_CalibrationFile, ...]),
+    ],
 )
 
 
 class MountKeys(EdgeKeys):
     """The keys of what is bolted on, and so can be measured."""
 
-    calibration: Calibration | None = key(
-        None,
-        "a file with the measured pose; the pose in this entry is the nominal one",
+    calibration: Calibrations = key(
+        (),
+        "a file with the measured pose, or a list of files with the days on which each is valid;"
+        " the pose in this entry is the nominal one",
         "calibration/hand_eye.yaml",
     )
     joint: Text | None = key(

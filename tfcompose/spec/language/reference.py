@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import types
 from dataclasses import dataclass
+from datetime import date
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from tfcompose.foundation.tool import installed_tools
@@ -275,6 +276,7 @@ def _type(annotation: Any) -> str:
         return f"[{_title(annotation)}](#{_title(annotation).lower()})"
     return {
         str: "string",
+        date: "day",
         bool: "true or false",
         int: "whole number",
         float: "number",

@@ -41,7 +41,14 @@ from tfcompose.spec.language.args import Args
 from tfcompose.spec.language.bodies import LinkSpec
 from tfcompose.spec.language.hosts import HostName, HostSpec
 from tfcompose.spec.language.optics import OpticsSpec
-from tfcompose.spec.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
+from tfcompose.spec.language.pose import (
+    CalibrationFiles,
+    EdgeKeys,
+    MountKeys,
+    Parents,
+    Posed,
+    Rotated,
+)
 from tfcompose.spec.language.process import ContainerSpec, Driver, ProcessSpec
 from tfcompose.spec.language.rules import RuleSetting, ZoneSpec
 from tfcompose.spec.language.spec import (
@@ -515,7 +522,7 @@ class RobotSpec(Spec):
     include: OneOrMore = key(
         (), "files that this file is merged over, relative to this file", ["base.yaml"]
     )
-    calibrations: OneOrMore = key(
+    calibrations: CalibrationFiles = key(
         (), "calibration files; every entry is applied", ["calibration/kit.yaml"]
     )
     base: Text | None = key(

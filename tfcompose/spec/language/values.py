@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from datetime import date
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict
@@ -234,6 +235,14 @@ def _is_visible(factors: Vector) -> Vector:
     raise invalid("TF106", "a scale of 0 leaves nothing of the mesh", "for example 0.001")
 
 
+def _day(value: Any) -> date:
+    try:
+        return value if isinstance(value, date) else date.fromisoformat(value)
+    except (ValueError, TypeError):
+        advice = "write it as YEAR-MONTH-DAY: 2026-03-01"
+        raise invalid("TF103", f"{format_value(value)} is not a day", advice) from None
+
+
 #: Colours that have names, in red, green and blue: those of HTML 4 and three that robots often
 #: have.
 COLOURS = {
@@ -307,6 +316,7 @@ RosName = Annotated[
 #: A variable of the environment.
 VariableName = Annotated[Text, AfterValidator(_names_a_variable)]
 Texts = tuple[Text, ...]
+Day = Annotated[date, Strict(), BeforeValidator(_day)]
 #: A list of strings, or one string for a list of one.
 OneOrMore = TypeAliasType("OneOrMore", Annotated[Texts, BeforeValidator(as_list, Text | Texts)])
 Xyz = TypeAliasType("Xyz", Annotated[tuple[Length, Length, Length], InARow(3, "[0.2, 0, 30 cm]")])

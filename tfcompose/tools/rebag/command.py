@@ -74,14 +74,14 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Correct the bag; exit code 0, or 1 if --check finds a change or OUT cannot be written."""
-    from tfcompose.cli.live import from_bag
+    from tfcompose.cli.live import from_bag, recording_day
     from tfcompose.cli.plans import expected_plan
     from tfcompose.foundation.signals import Stop
 
     if bool(arguments.out) == arguments.check:
         fail("give OUT, where the new bag goes, or --check", UNREADABLE)
     target = None if arguments.check else _target(Path(arguments.out))
-    plan, _ = expected_plan(arguments.file, arguments)
+    plan, _ = expected_plan(arguments.file, arguments, recording_day(arguments.bag))
     with Stop() as stop:
         rewrite = from_bag(lambda: _rewrite(arguments, plan, stop))
         try:

@@ -141,7 +141,7 @@ def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
 
 
 def test_its_calibrated_robot_is_linted_and_explained_as_printed(tmp_path: Path) -> None:
-    robot, measured = blocks("yaml", PAGES["calibration"])
+    robot, measured, _ = blocks("yaml", PAGES["calibration"])
     (tmp_path / "cell.yaml").write_text(robot, encoding="utf-8")
     (tmp_path / "camera.calib").write_text(measured, encoding="utf-8")
     done = run("lint", "cell.yaml", "--fail-on", "warning", cwd=tmp_path)

@@ -112,6 +112,7 @@ from tfcompose.tools.fleet.spec import validate_fleet
 from tfcompose.tools.importers.draft import ImportDraft
 from tfcompose.tools.importers.shell import add_script
 from tfcompose.tools.rebag import command as rebag
+from tfcompose.tools.rebag import play
 from tfcompose.tools.rebag.messages import MessageEditor
 from tfcompose.tools.rebag.recorded_topic import RecordedTopic
 
@@ -879,6 +880,7 @@ def corrected() -> Iterator[Finding]:
     editor = MessageEditor({"old": "new"}, {})
     editor.editor_of(topic)
     yield from rebag.warnings_of(editor.unknown, {"/tf": 2})
+    yield from play.warnings_of(["base_link → bracket"])
 
 
 def imported() -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""Rebag tool: recordings with the poses of a robot file."""
+"""Rebag tool: recordings with the poses of a robot file, written anew or played."""
 
 from tfcompose.foundation.tool import Command, Tool
 
@@ -10,6 +10,12 @@ TOOL = Tool(
             "rebag",
             "Copy a recording with the poses of a robot file",
             "tfcompose.tools.rebag.command",
+            group="Ship",
+        ),
+        Command(
+            "play",
+            "Play a recording with the fixed edges of a robot file",
+            "tfcompose.tools.rebag.play",
             group="Ship",
         ),
     ),

@@ -30,7 +30,7 @@ def show_args(arguments: Namespace) -> int:
     """
     file = _file(arguments)
     if is_plan(file):
-        fail(f"{file} is a built plan, and arguments are those of a robot file", UNREADABLE)
+        fail(f"{file} is a built plan; only robot files have arguments", UNREADABLE)
     try:
         args, _ = args_and_profiles(file, arguments.profiles, overlays_of(arguments))
     except RejectedError as error:
@@ -70,7 +70,7 @@ def _lines(name: str, declared: ArgSpec) -> Iterator[str]:
     bounds = (("at least", declared.min), ("at most", declared.max))
     facts += [f"{what} {bound}" for what, bound in bounds if bound is not None]
     facts.append(
-        "has to be given" if declared.default is None else f"default: {as_given(declared.default)}"
+        "required" if declared.default is None else f"default: {as_given(declared.default)}"
     )
     facts += [f"or {declared.env} in the environment"] if declared.env else []
     yield f"{name}:=…  {', '.join(facts)}"

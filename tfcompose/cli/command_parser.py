@@ -39,7 +39,7 @@ class Parser(ArgumentParser):
         """Print the error and exit with 2."""
         import difflib
 
-        advice = f"{self.prog} --help lists what there is"
+        advice = f"{self.prog} --help lists the options"
         if message.startswith("unrecognized arguments"):
             options = [
                 token.partition("=")[0] for token in message.split() if token.startswith("-")

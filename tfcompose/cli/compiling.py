@@ -216,7 +216,7 @@ def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]
     rising = [edge for edge in up if id(edge) not in shared]
     falling = [edge for edge in down if id(edge) not in shared]
     if (rising[-1].parent if rising else a) != (falling[-1].parent if falling else b):
-        fail(f"{a} and {b} are in two trees")
+        fail(f"{a} and {b} are in separate trees")
     return rising, falling
 
 
@@ -327,5 +327,5 @@ def report_missing_confinement(missing: Sequence[str]) -> None:
 def missing_confinement(feature: str) -> Finding:
     """Return the finding that the kernel lacks a feature to confine files."""
     message = f"this kernel has no {feature}: {_NOT_HELD[feature]}"
-    advice = "tfcompose help sandbox; read files of strangers on another machine"
+    advice = "see tfcompose help sandbox; read untrusted files on another machine"
     return finding("TF923", message, None, help=advice)

@@ -182,7 +182,7 @@ class Console:
             host = self._hosts.get(notice.process)
             text = (
                 f"expecting {notice.process} ({nodes}):"
-                f" {f'{host} starts it' if host else 'it is started elsewhere'}"
+                f" {f'{host} starts it' if host else 'it starts elsewhere'}"
             )
         elif notice.detail:
             text += f": {notice.detail}"
@@ -226,7 +226,7 @@ class Console:
     def _(self, notice: Replanned) -> None:
         self._width = max(self._width, *map(len, ("", *notice.added)))
         changes = describe_changes(notice, ("changed", "new", "gone", "new description"))
-        self._say(f"another plan: {changes or 'nothing to restart'}")
+        self._say(f"new plan: {changes or 'nothing to restart'}")
         if notice.held:
             self._say(self._paint(describe_vanished_edges(notice.held), YELLOW))
 
@@ -264,9 +264,9 @@ class Console:
 
     @_write.register
     def _(self, notice: FilesRestored) -> None:
-        text = f"the files of this run were removed, and are in {notice.folder} again"
+        text = f"the files of this run were removed: written to {notice.folder} again"
         if notice.why:
-            text = f"the files of this run were removed, and cannot be written again: {notice.why}"
+            text = f"the files of this run were removed and cannot be restored: {notice.why}"
         self._say(self._paint(text, YELLOW))
 
     @_write.register

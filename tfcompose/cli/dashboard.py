@@ -55,18 +55,18 @@ Keys
   ↑ ↓ or k j       choose a process; in a log or a list, scroll
   Enter or l       show the log of the chosen process
   1 to 9, 0        show the log of that process; 0: of tfcompose itself
-  ← →              in a log: the one of the process before, or after
+  ← →              in a log: the previous or next process
   PgUp PgDn        scroll by a page; Home and End go to the first and last line
   e                edges: owner, rate, and which are not live
-  f or g           findings, with notes and what helps
+  f or g           findings, with notes and help
   Esc              back to the processes
-  q                back; on the first page: end the robot, after another q
-  Ctrl-L           draw the screen anew
-  Ctrl-C           end the robot
-  Ctrl-Z           back to the shell; the robot goes on, and fg shows it again
+  q                back; on the first page: stop the robot (press q twice)
+  Ctrl-L           redraw the screen
+  Ctrl-C           stop the robot
+  Ctrl-Z           back to the shell; the robot keeps running, and fg shows it again
 
-A log that is scrolled back stays where it is; End follows it again.
-In another terminal, tfcompose ps, logs, restart and doctor work as always.
+A log that you scroll back stays there; End follows it again.
+In another terminal, tfcompose ps, logs, restart and doctor work as usual.
 tfcompose up --no-live prints lines instead of this view."""
 
 #: The keys of each page, those first that a narrow terminal must not lack.
@@ -342,7 +342,7 @@ class Dashboard:
     def _foot(self) -> Text:
         if self._confirming:
             return Text(
-                f" q again ends {self.name}; any other key goes on", style="reverse yellow"
+                f" q again stops {self.name}; any other key cancels", style="reverse yellow"
             )
         return Text(f" {_KEYS[self.page]}", style="dim")
 

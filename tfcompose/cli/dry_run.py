@@ -80,7 +80,7 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
         value = str(argument).lower() if is_bool else _quote(str(argument))
         yield f"  arg      {name}:={value}"
     for name, value in plan.environment.items():
-        yield f"  env      {name}={_quote(value)}, when it was built"
+        yield f"  env      {name}={_quote(value)}, at build time"
     for process in plan.processes:
         yield ""
         yield from _process(plan, process, files)
@@ -138,12 +138,12 @@ def _fence(plan: Plan, process: PlanProcess) -> str:
     topics = private_topics(plan).get(process.name)
     ways = {
         "partition": f"the partition {partition_of(plan)}",
-        "remap": " and ".join(topics) if topics else "where it is sent: no remapping reaches it",
+        "remap": " and ".join(topics) if topics else "the usual topics: no remapping reaches it",
     }
     way = (
         ways.get(plan.guard.fence) or f"{ways['partition']} with Fast DDS, else to {ways['remap']}"
     )
-    return f"its TF goes to {way}; the guard passes on what it owns"
+    return f"its TF goes to {way}; the guard forwards the edges that it owns"
 
 
 def _times(process: PlanProcess) -> Iterator[str]:

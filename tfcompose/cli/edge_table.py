@@ -62,7 +62,7 @@ def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) ->
     if senders:
         parts.insert(1, plural(len(senders), "publisher"))
     bad = sum(observer.malformed.values())
-    parts += [f"{bad} not readable"] if bad else []
+    parts += [f"{bad} unreadable"] if bad else []
     parts += ["delays are from stamp to recording"] if observer.end_ns else []
     parts += [not_kept(observer)] if observer.beyond else []
     return ", ".join(parts)
@@ -128,10 +128,10 @@ def chain_line(chain: FrameChain | str, a: str, b: str) -> str:
         return f"{ends}: {printable(chain)}"
     parts = [plural(len(chain.newest), "edge")]
     if delay := chain.delay:
-        times = f"{duration(delay.mean_s)} in the mean, {duration(delay.most_s)} at most"
+        times = f"{duration(delay.mean_s)} on average, {duration(delay.most_s)} at most"
         parts.append(f"net delay {times}, by {printable(delay.edge.name)}")
     else:
-        parts.append("none of them moves")
+        parts.append("all fixed")
     return f"{ends}: {', '.join(parts)}"
 
 

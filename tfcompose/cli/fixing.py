@@ -159,5 +159,5 @@ def rewrite(path: Path, old: str, new: str) -> None:
     data = path.read_bytes()
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     if data != mark + old.encode():
-        raise ChangedError(0, "it has changed meanwhile", str(path))
+        raise ChangedError(0, "it changed in the meantime", str(path))
     replace_file(path, mark + new.encode())

@@ -141,8 +141,8 @@ class _Variants:
         for index, values in enumerate(every):
             if time.monotonic() - begin > JUDGE_FOR_S:
                 warn(
-                    f"{self.source.file}: judged in {index} of {len(every)} combinations of its"
-                    f" args, within {JUDGE_FOR_S:g} s"
+                    f"{self.source.file}: checked {index} of {len(every)} combinations of its args"
+                    f" in {JUDGE_FOR_S:g} s and skipped the others"
                 )
                 break
             args = dict(self.given.args)

@@ -201,13 +201,13 @@ def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) ->
     if seconds >= min(SURE_S, duration_s or SURE_S):
         return
     if not heard:
-        fail(f"ended by a signal after {seconds:.1f} s, before any message came", INTERRUPTED)
+        fail(f"interrupted after {seconds:.1f} s, before any message arrived", INTERRUPTED)
     if duration_s is not None:
         warn(f"listened for only {seconds:.1f} s, too short to find every publisher")
 
 
 def _reject_silent_bag(bag: str, topics: Sequence[Topics]) -> None:
-    message = f"no message was recorded on {names_of(topics)} in {bag}"
+    message = f"{bag} has no messages on {names_of(topics)}"
     help_ = (
         "was the robot running? /tf_static is sent once: record it with durability transient_local"
     )
@@ -216,8 +216,8 @@ def _reject_silent_bag(bag: str, topics: Sequence[Topics]) -> None:
 
 def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:
     """Report that there was no TF."""
-    message = f"no TF message came on {names_of(topics)} for {seconds:.1f} s"
-    notes = [Note(f"looked with {settings_text(os.environ)}")]
+    message = f"no TF message arrived on {names_of(topics)} in {seconds:.1f} s"
+    notes = [Note(f"settings: {settings_text(os.environ)}")]
     reject([finding("TF811", message, None, notes=notes, help=elsewhere_help(elsewhere))])
 
 

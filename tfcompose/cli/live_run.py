@@ -369,7 +369,7 @@ class _LiveView:
         except Exception as error:  # noqa: BLE001 (a fault of the view ends no robot)
             self._fault = f"{type(error).__name__}: {error}"
             self._screen.leave()
-            warn(f"the live view failed: {self._fault}; the robot goes on, and Ctrl-C ends it")
+            warn(f"the live view failed: {self._fault}; the robot runs on, and Ctrl-C stops it")
 
     def _wait_for_terminal(self) -> None:
         """Wake up when the terminal takes more, while output is pending."""
@@ -389,7 +389,7 @@ class _LiveView:
             self._lose_terminal()
 
     def _lose_terminal(self) -> None:
-        self._fault = "the terminal has gone"
+        self._fault = "the terminal was closed"
         self._screen.output.finish(0)
         self._pass_on(signal.SIGHUP)
 

@@ -66,14 +66,14 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
     ):
         *options, last = ["--profile", "--overlay", "--set", *(f"--{option}" for option in more)]
         fail(
-            f"a built plan takes no {', '.join(options)} and {last}: these options are for"
-            " building it",
+            f"a built plan takes no {', '.join(options)} or {last}: these options apply at"
+            " build time",
             UNREADABLE,
         )
     if getattr(arguments, "ros_args", ()):
-        fail("a built plan takes no --ros-args: build with them", UNREADABLE)
+        fail("a built plan takes no --ros-args: pass them to build", UNREADABLE)
     if arguments.given:
-        built_with = "; tfcompose up --dry-run PLAN prints those that it was built with"
+        built_with = "; tfcompose up --dry-run PLAN prints the arguments of its build"
         fail(
             f"{next(iter(arguments.given))}:=…: a built plan takes no arguments{built_with}",
             UNREADABLE,

@@ -26,7 +26,7 @@ def ros_arguments(argv: Sequence[str]) -> RosArguments:
         rule = rest.pop(0) if rest and flag in _ROS_FLAGS else ""
         old, sign, new = rule.partition(":=")
         if not sign or not old or not new:
-            fail(f"--ros-args: {f'{flag} {rule}'.strip()} is none of {_TAKEN}", UNREADABLE)
+            fail(f"--ros-args: {f'{flag} {rule}'.strip()} is not one of {_TAKEN}", UNREADABLE)
         if flag in _REMAP_FLAGS and old == "__ns":
             try:
                 arguments = replace(arguments, namespace=namespace(new))
@@ -37,8 +37,8 @@ def ros_arguments(argv: Sequence[str]) -> RosArguments:
         elif flag in _PARAM_FLAGS and old == "use_sim_time" and new.lower() in {"true", "false"}:
             arguments = replace(arguments, use_sim_time=new.lower() == "true")
         else:
-            advice = "names and parameters of one node are in the robot file"
-            fail(f"--ros-args: {flag} {rule} is none of {_TAKEN}; {advice}", UNREADABLE)
+            advice = "set names and parameters of a single node in the robot file"
+            fail(f"--ros-args: {flag} {rule} is not one of {_TAKEN}; {advice}", UNREADABLE)
     return arguments
 
 

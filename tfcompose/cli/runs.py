@@ -89,12 +89,12 @@ def chosen_run(
     if not known:
         fail(f"no robot {verb} here")
     if not found and name:
-        fail(f"no robot {name} {verb} here; there is {names}")
+        fail(f"no robot {name} {verb} here; known robots: {names}")
     if not found:
         example = f"tfcompose {command} --robot {known[0].name}"
         fail(
-            f"no robot {verb} in ROS domain {domain_of(os.environ)}; elsewhere there is {names}:"
-            f" {example}"
+            f"no robot {verb} in ROS domain {domain_of(os.environ)}; elsewhere: {names}"
+            f" ({example})"
         )
     if len(found) > 1:
         fail(
@@ -186,7 +186,7 @@ def notices(
                     yield read_notice(line)
                 except (ValueError, TypeError) as error:
                     raise ConnectionError(
-                        f"its launcher reports what this tfcompose does not understand: {error}"
+                        f"this version of tfcompose cannot read what its launcher sends: {error}"
                     ) from None
 
 
@@ -277,8 +277,8 @@ def find_hidden_run(runtime_dir: RuntimeDir) -> str | None:
         folder = procfs.environ(led[0].launcher).get("XDG_RUNTIME_DIR")
         where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
         return (
-            f"{runtime_dir.name} runs already: pid {led[0].launcher}, with {where}; set it for ps"
-            " and down"
+            f"{runtime_dir.name} is already running: pid {led[0].launcher}, with {where}; use the"
+            " same for ps and down"
         )
     return None
 
@@ -385,7 +385,7 @@ def _left_behind(runtime_dir: RuntimeDir, run_id: str) -> Iterator[str]:
         if leftover.run != run_id and leftover.launcher is None
     ]
     for leftover in found:
-        yield f"an earlier run left {leftover.pid} behind: {leftover.command}"
+        yield f"an earlier run left process {leftover.pid} behind: {leftover.command}"
     if found:
         them = "it" if len(found) == 1 else "them"
         yield f"tfcompose down --leftovers --robot {runtime_dir.name} stops {them}"

@@ -18,7 +18,7 @@ def languages() -> tuple[str, ...]:
 #: Languages whose keys are not described for people, and why.
 WITHOUT_REFERENCE = {
     "overlay": "an overlay has the keys of a robot file",
-    "plan": "plan.json is written by build",
+    "plan": "build writes plan.json",
 }
 
 

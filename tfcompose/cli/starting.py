@@ -123,7 +123,7 @@ def start(
     with ExitStack() as stack:
         stack.callback(lock.close)
         if arguments.update or ros_trouble(os.environ):
-            fail(f"{runtime_dir.name} does not run, and up --update starts nothing")
+            fail(f"{runtime_dir.name} is not running; up --update only updates a running robot")
         if hidden := find_hidden_run(runtime_dir):
             fail(hidden)
         copy = copy_plan(plan, file, runtime_dir, alone=True)
@@ -201,7 +201,7 @@ def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespac
     """
     holder = runtime_dir.holder()
     who = (
-        f"{runtime_dir.name} runs already: pid {holder.pid}, since {since(holder)}"
+        f"{runtime_dir.name} is already running: pid {holder.pid}, since {since(holder)}"
         if holder
         else f"{runtime_dir.name} just ended"
     )
@@ -212,15 +212,13 @@ def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespac
     answer = request(runtime_dir, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
         fail(who)
-    changes = describe_changes(
-        answer, ("restarted", "started", "stopped", "given the new description")
-    )
+    changes = describe_changes(answer, ("restarted", "started", "stopped", "new description for"))
     if answer.differs:
-        print(f"{who}; {changes or 'the plan is another one, and nothing had to be restarted'}")
+        print(f"{who}; {changes or 'the plan changed, and nothing had to restart'}")
     elif changes:
         print(f"{who}; {changes}")
     else:
-        warn(f"{who}; the plan is the same; tfcompose down stops it")
+        warn(f"{who}, with the same plan; tfcompose down stops it")
     if answer.held and changes:
         print(describe_vanished_edges(answer.held))
     if arguments.wait:
@@ -285,8 +283,8 @@ def _detach(
     if goes_with_logout(runtime_dir):
         user = user_name()
         warn(
-            f"{user} does not linger: a logout removes {runtime_dir.folder}, and may end the"
-            f" robot; to keep them: loginctl enable-linger {user}"
+            f"lingering is off for {user}: logging out removes {runtime_dir.folder} and may stop"
+            f" the robot; to keep both: loginctl enable-linger {user}"
         )
     pid = _fork(plan, runtime_dir, lock, session, arguments.duration)
     return _follow(plan, runtime_dir, pid, arguments)

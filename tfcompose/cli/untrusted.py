@@ -116,7 +116,7 @@ class UntrustedFiles:
         """
         if path != STDIN and not self.reach.allows(path):
             withhold(path)
-            message = "may not be read: it is outside of the robot's tree"
+            message = "may not be read: it is outside the robot's tree"
             raise RejectedError([finding("TF021", message, Span(path), help=OUTSIDE)])
         return self._read(path)
 

@@ -254,7 +254,7 @@ def _clashes(tool: Tool, owners: Mapping[tuple[str, str], str]) -> Iterator[Prob
 def _wrong_codes(tool: Tool) -> Iterator[Problem]:
     for code in tool.code_names():
         if not _FOREIGN_CODE.fullmatch(code):
-            message = f"the tool {tool.name} is left out: {code} is no code of its own"
+            message = f"the tool {tool.name} is left out: {code} is not one of its codes"
             advice = "give its codes a prefix of their own and three digits: ACME101"
             yield Problem("TF922", message, advice)
 

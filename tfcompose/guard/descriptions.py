@@ -62,7 +62,7 @@ class Descriptions:
         for process, (writer, since) in list(self._writers.items()):
             why = writer.refusal()
             if why is None and time.monotonic() - since > ANSWER_S:
-                why = f"it does not answer within {ANSWER_S:g} s"
+                why = f"it did not answer within {ANSWER_S:g} s"
             if why is not None:
                 self.forget(process)
                 self._emit(DescriptionState(process, why))

@@ -103,7 +103,7 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], findings: Sequence[Finding
     level = ERROR if severe else WARN if findings else OK
     message = (
         "; ".join(f"{finding.code} {finding.message}" for finding in findings)
-        or f"{len(edges)} edges are watched"
+        or f"{len(edges)} edges watched"
     )
     lines = [
         Status(

@@ -515,7 +515,7 @@ class Ledger:
             notes += [Note(_FATE[fate]) for fate in fates]
         offender = process if process in self._stoppable and first.code in _STOPPED_FOR else ""
         if not offender and self._may_be_ours(first):
-            notes += [Note("it is not proven which process did it: none is stopped")]
+            notes += [Note("nothing is stopped: it is not certain which process did it")]
         return FindingShown(replace(finding, notes=(*finding.notes, *notes)), offender)
 
     def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
@@ -530,7 +530,7 @@ class Ledger:
             event = self._event(entries, edges, now)
             who = entries[0].fault.who
             ended = dict.fromkeys(where for entry in entries for where in left[entry.fault.ends])
-            notes = [Note(f"{who} has ended, which ran {where}") for where in ended]
+            notes = [Note(f"{who} has ended; it ran {where}") for where in ended]
             finding = replace(event.found, notes=(*event.found.notes, *notes))
             yield FindingShown(finding, event.process if isinstance(event, FindingShown) else "")
 

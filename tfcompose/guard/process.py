@@ -358,8 +358,8 @@ def guard(own: Own, stop: Stop) -> None:
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         if not ids_say_who(node):
             say(
-                "this rmw does not say with a message who sent it: findings name all who may have,"
-                " where several may"
+                "this rmw does not identify the sender of a message: if several nodes may have"
+                " sent it, findings name all of them"
             )
             if middleware() == IMPLEMENTATIONS["zenoh"]:
                 say("pip install 'tfcompose[zenoh]' reads it from Zenoh's liveliness tokens")
@@ -372,7 +372,7 @@ def guard(own: Own, stop: Stop) -> None:
         ]
         if switches:
             memories.append(SwitchMemory(switches, events.emit, left))
-        judging = "" if judges else ", and judging nobody"
+        judging = "" if judges else ", without checks"
         say(f"watching {plural(len(own.plan.edges), 'edge')}{judging}{' again' if left else ''}")
         events.flush()
         ready()
@@ -426,7 +426,7 @@ def _reread(own: Own, judges: Sequence[Judge], switches: Switches | None, file: 
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
     except (OSError, ValueError, RejectedError) as error:
-        say(f"findings keep the lines of the plan before: {error}")
+        say(f"findings still name lines of the previous plan: {error}")
         return
     for judge, part in zip(judges, plans_by_topics(plan, own.process).values(), strict=True):
         judge.follow(part)

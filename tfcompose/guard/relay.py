@@ -182,7 +182,7 @@ class Relay:
         self._refused[gid] = None
         where = self._graph.where(gid)
         who = f"a publisher that runs {where}" if where else "a publisher of an unknown process"
-        say(f"nothing is passed on from {who}: it is not seen to be a process of this run")
+        say(f"nothing from {who} is forwarded: it is not known to be a process of this run")
 
     def _send(self, data: bytes, process: str) -> None:
         self._moving.publish(data)

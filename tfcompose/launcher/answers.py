@@ -123,7 +123,7 @@ def _update(
     except (OSError, ValueError, RejectedError) as error:
         return Refusal(f"{request.plan!r} cannot be used: {error}"), None, None
     if state.stop:
-        return Refusal("everything is being stopped"), None, None
+        return Refusal("the robot is stopping"), None, None
     try:
         commands, findings = commands_of(
             plan, plan.managed, file, base, environment, Path(request.base)
@@ -166,12 +166,12 @@ def _plain_file(file: Path) -> bytes:
     with os.fdopen(descriptor, "rb") as stream:
         found = os.fstat(descriptor)
         if not stat.S_ISREG(found.st_mode):
-            raise OSError("it is not a plain file")
+            raise OSError("it is not a regular file")
         if found.st_size > MOST_PLAN_BYTES:
             raise OSError(f"it is larger than {MOST_PLAN_BYTES:,} bytes")
         data = stream.read(found.st_size)
     if data is None:
-        raise BlockingIOError("reading it would wait")
+        raise BlockingIOError("reading it would block")
     return data
 
 

@@ -189,8 +189,8 @@ class Pipe:
             tail = tail[begin:]
         if bucket.thrown:
             self._sink(
-                f"… {bucket.thrown:,} bytes of output were thrown away here: more came than a log"
-                " can hold"
+                f"… {bucket.thrown:,} bytes of output were dropped here: more than the log can"
+                " take"
             )
             bucket.thrown = 0
         for line in self._lines.feed(tail):

@@ -300,7 +300,9 @@ class Children:
                 matches = None
                 self._notify(
                     LogLine(
-                        child.name, "stderr", f"ready: log: {gate!r} takes too long here: given up"
+                        child.name,
+                        "stderr",
+                        f"ready: log: matching {gate!r} takes too long on this line; gave up",
                     )
                 )
             if child.gate_matched:

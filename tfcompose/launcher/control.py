@@ -113,7 +113,7 @@ def _ensure_it_runs(runtime_dir: RuntimeDir) -> None:
         return
     if _is_suspended(holder.pid):
         raise ConnectionError(
-            f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} lets it go on"
+            f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} resumes it"
         )
 
 
@@ -137,7 +137,7 @@ def ask(runtime_dir: RuntimeDir, request: Request, answer: type[A]) -> A:
         return msgspec.convert(data, answer)
     except (*UNREADABLE, TypeError) as error:
         raise ConnectionError(
-            f"its launcher answers what this tfcompose does not understand: {error}"
+            f"this version of tfcompose cannot read its launcher's answer: {error}"
         ) from None
 
 

@@ -43,20 +43,18 @@ def ended_by_itself_finding(
 def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
     """Return the finding for a guard that ended while the others run, and restarts."""
     verb = "was ended by" if event.returncode < 0 else "ended with"
-    blind = "no edge of the plan reaches /tf" if strict else "the tree is not watched"
+    blind = "no edge of the plan reaches /tf" if strict else "no process watches the tree"
     message = f"{name} {verb} {describe_exit(event.returncode)}: {blind} until it is back"
     notes = [Note(f"{name}: {line}") for line in event.last_lines]
-    advice = "it is restarted, and repeats no report"
+    advice = "tfcompose restarts it; it does not repeat earlier findings"
     return finding("TF808", message, None, severity="warning", notes=notes, help=advice)
 
 
 def guard_hangs(name: str, seconds: float, *, strict: bool) -> Finding:
     """Return the finding for a guard that runs without a sign of life for ``seconds``."""
-    blind = "passed nothing on" if strict else "watched nothing"
+    blind = "forwarded nothing" if strict else "watched nothing"
     message = f"{name} hangs: it has {blind} for {seconds:.0f} s"
-    return finding(
-        "TF808", message, None, severity="warning", help="it is ended and started again"
-    )
+    return finding("TF808", message, None, severity="warning", help="tfcompose restarts it")
 
 
 def not_started_finding(name: str, why: str) -> Finding:

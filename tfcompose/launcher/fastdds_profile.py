@@ -110,7 +110,7 @@ def _read(file: Path | None) -> ET.Element:
         return _ProfileReader().read(_EMPTY)
     try:
         if not file.is_file():
-            raise RosError("it is no plain file" if file.exists() else "it is not there")
+            raise RosError("it is not a regular file" if file.exists() else "it does not exist")
         with file.open("rb") as opened:
             data = opened.read(MOST_BYTES + 1)
     except OSError as error:

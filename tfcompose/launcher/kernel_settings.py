@@ -154,7 +154,7 @@ def _open_files_refusal(name: str, count: int) -> Finding | None:
         message = f"this user may not start {name} with open_files {count}"
         advice = (
             f"{before[1]} or less, or nofile in /etc/security/limits.conf, or the capability"
-            " CAP_SYS_RESOURCE; the most is fs.nr_open"
+            " CAP_SYS_RESOURCE; the maximum is fs.nr_open"
         )
         return finding("TF911", message, None, help=advice)
     resource.setrlimit(resource.RLIMIT_NOFILE, before)

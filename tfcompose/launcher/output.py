@@ -71,8 +71,7 @@ class NonBlockingOutput:
             return
         if self.left_out and not self._owed:
             self._owed += (
-                f"… {self.left_out} lines are left out here: they came too fast, and are in the"
-                " logs\n".encode()
+                f"… {self.left_out} lines were too fast to print; they are in the logs\n".encode()
             )
             self._announced, self.left_out = self.left_out, 0
         self._owed += text.encode(errors="backslashreplace")
@@ -312,7 +311,7 @@ class Logs:
             log.size += len(data)
         except OSError as error:
             first, self._failed, self.lost = self.lost == 0, time.monotonic(), self.lost + 1
-            return f"logs are not written to {self.folder}: {error.strerror}" if first else None
+            return f"logs cannot be written to {self.folder}: {error.strerror}" if first else None
         return None
 
     def close(self) -> None:

@@ -387,7 +387,7 @@ def _launch_command(
     arguments = dict(argument.split(":=", 1) for argument in argv[1:] if ":=" in argument)
     odd = [argument for argument in argv[1:] if ":=" not in argument]
     if odd:
-        message = f"{process.name}: {odd[0]} is no argument of a launch file"
+        message = f"{process.name}: {odd[0]} is not a launch argument"
         return finding("TF902", message, None, help="give name: value, or name:=value")
     settings = {
         "file": str(file),

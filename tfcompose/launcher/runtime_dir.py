@@ -232,7 +232,7 @@ def _runtime_folder(env: Mapping[str, str]) -> Path:
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
     except OSError as error:
-        raise RuntimeDirError(f"{folder} cannot be made: {error.strerror}") from None
+        raise RuntimeDirError(f"{folder} cannot be created: {error.strerror}") from None
     if not _is_ours(folder):
         raise RuntimeDirError(
             f"{folder} is not a folder that only this user can open; set XDG_RUNTIME_DIR to one"

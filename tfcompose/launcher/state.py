@@ -270,7 +270,7 @@ class Transition:
             self.fail(finding)
         elif self.state.stop is None:
             advice = (
-                f"the robot goes on without it: required is false; tfcompose start {name} tries"
+                f"the robot continues without it (required: false); tfcompose start {name} tries"
                 " again"
             )
             self.report(replace(finding, severity="warning", help=advice))

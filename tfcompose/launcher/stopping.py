@@ -221,16 +221,16 @@ def refusal(state: State, name: str, verb: Verb) -> str | None:
         advice = did_you_mean(name, state.tracked, f"it has {', '.join(state.tracked)}")
         return f"the plan has no process {name}; {advice}"
     if state.stop:
-        return "everything is being stopped"
+        return "the robot is stopping"
     if tracked.state == "expected":
-        return f"{name} is external, and started and stopped elsewhere"
+        return f"{name} is external: start and stop it where it runs"
     if name == state.guard and verb != "restart":
         return (
-            f"{name} watches the others and is not stopped alone; tfcompose up --guard off checks"
-            " nothing"
+            f"{name} watches the others and cannot be stopped alone; tfcompose up --guard off"
+            " runs without checks"
         )
     if verb == "start" and tracked.alive and tracked.leaving != "stop":
-        return f"{name} runs already, with pid {tracked.pid}"
+        return f"{name} is already running, with pid {tracked.pid}"
     if (
         verb == "stop"
         and not tracked.alive
@@ -345,7 +345,7 @@ def stop_if_requested(step: Transition, event: Event) -> None:
         case Signalled(number):
             _note_signal(step, signal_name(number))
         case OutputLost():
-            step.stop(StopReason("failure", UNREAD), "nobody reads the output any more")
+            step.stop(StopReason("failure", UNREAD), "the reader of the output closed it")
         case TimeUp():
             _time_up(step)
         case _:
@@ -418,7 +418,9 @@ def send_due_signals(step: Transition) -> None:
             lose_edges(step, tracked)
             lose_components(step, name)
         step.actions.append(Kill(name, signals[level - 1]))
-        before = f"still there after {signals[tracked.level - 1].name}: " if tracked.level else ""
+        before = (
+            f"still running after {signals[tracked.level - 1].name}: " if tracked.level else ""
+        )
         step.enter(
             name, "stopping", before + signals[level - 1].name, pid=tracked.pid, level=level
         )

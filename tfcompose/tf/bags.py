@@ -356,7 +356,7 @@ def _files_at(path: Path) -> list[Path]:
     if path.name == "metadata.yaml":
         path = path.parent
     if not exists(path):
-        raise BagError(f"there is no bag {path}")
+        raise BagError(f"{path} does not exist")
     if is_folder(path):
         if is_file(path / "metadata.yaml"):
             return [path]

@@ -92,12 +92,12 @@ def run(arguments: Namespace) -> int:
         observed += (
             f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
         )
-        print(f"looked for {found.seconds:.1f} s at {observed}: {_summary(findings)}")
+        print(f"observed {observed} for {found.seconds:.1f} s: {_summary(findings)}")
         for cost in found.costs:
             print(printable(cost))
         if found.edges and found.elsewhere:
             options = namespace_options(found.elsewhere)
-            print(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {options}")
+            print(f"TF is also on {', '.join(found.elsewhere[:MOST_ROOTS])}: {options}")
     return code
 
 

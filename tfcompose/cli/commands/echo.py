@@ -128,8 +128,7 @@ def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
             reject([finding("TF901", str(error), None)])
         if stop.requested and not shown and missed is None:
             fail(
-                f"ended by a signal after {time.monotonic() - begun:.1f} s, before there was a"
-                " pose",
+                f"interrupted after {time.monotonic() - begun:.1f} s, before there was a pose",
                 INTERRUPTED,
             )
     return missed

@@ -74,7 +74,7 @@ def _explain_code(text: str) -> None:
     code = code_of(text)
     if code is None:
         advice = did_you_mean(text, similar_words(text), "lint prints codes: TF301")
-        fail(absent_code(text) or f"no code {text}; {advice}", UNREADABLE)
+        fail(absent_code(text) or f"unknown code {text}; {advice}", UNREADABLE)
     sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{CATALOGUE.page(code)}\n")
 
 

@@ -108,9 +108,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--untrusted",
         action="store_true",
-        help=(
-            "for files of strangers, as in CI: read only the robot's own tree, and no environment"
-        ),
+        help=("for untrusted files, as in CI: read only the robot's own tree and no environment"),
     )
     parser.add_argument(
         "-w",
@@ -134,11 +132,11 @@ def codes(text: str) -> list[str]:
         if not named:
             raise ArgumentTypeError(
                 absent_code(beginning)
-                or f"there is no code {beginning}; tfcompose explain --table lists them"
+                or f"unknown code {beginning}; tfcompose explain --table lists all codes"
             )
         if not any(code.can_be_allowed for code in named):
             raise ArgumentTypeError(
-                f"{beginning} is reported always: without it a robot cannot be read or built"
+                f"{beginning} is always reported: it prevents reading or building the robot"
             )
     return beginnings
 
@@ -150,11 +148,11 @@ def run(arguments: Namespace) -> int:
     if (arguments.fix or arguments.diff or arguments.watch) and STDIN in arguments.files:
         fail("standard input cannot be fixed or watched: name a file", UNREADABLE)
     if (arguments.diff or arguments.watch) and arguments.format != "text":
-        fail("--diff and --watch are for people: leave out --format", UNREADABLE)
+        fail("--diff and --watch print text: leave out --format", UNREADABLE)
     if arguments.untrusted:
         for option in ("fix", "diff", "trust"):
             if getattr(arguments, option):
-                fail(f"--untrusted reports, and trusts nothing: leave out --{option}", UNREADABLE)
+                fail(f"--untrusted only reports: leave out --{option}", UNREADABLE)
     from tfcompose.cli.untrusted import without_environment
 
     with without_environment(applies=arguments.untrusted) as environment:

@@ -74,7 +74,9 @@ def since(text: str) -> float:
         stamp = f"{time.strftime('%Y-%m-%d')}T{text:>05}" if ":" in text[:3] else text
         return datetime.fromisoformat(stamp).timestamp()
     except ValueError:
-        raise ArgumentTypeError(f"{text} is no time, such as 10m, 14:03 or 2026-11-26") from None
+        raise ArgumentTypeError(
+            f"{text} is not a time, such as 10m, 14:03 or 2026-11-26"
+        ) from None
 
 
 def run(arguments: Namespace) -> int:
@@ -86,7 +88,7 @@ def run(arguments: Namespace) -> int:
     known = logged_processes(runtime_dir.logs)
     for name in arguments.name:
         if name not in known:
-            advice = did_you_mean(name, known, f"there are logs of {', '.join(known)}")
+            advice = did_you_mean(name, known, f"it has logs of {', '.join(known)}")
             fail(f"{runtime_dir.name} has no log of {name}; {advice}")
     names = arguments.name or known
     if arguments.previous and arguments.follow:
@@ -95,7 +97,7 @@ def run(arguments: Namespace) -> int:
     end_s = math.inf
     if arguments.previous:
         if not any(earlier):
-            fail(f"no run of {runtime_dir.name} before this one is known")
+            fail(f"no run of {runtime_dir.name} before this one is recorded")
         begin_s, end_s = earlier[-1], begin_s
     elif arguments.since is not None:
         begin_s = arguments.since

@@ -60,7 +60,7 @@ def run(arguments: Namespace) -> int:
     if arguments.bag and arguments.duration:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
     if arguments.a and not arguments.b:
-        fail("the edges between two frames are shown: give both, A and B", UNREADABLE)
+        fail("give two frames, A and B, or none", UNREADABLE)
     frames = [name.removeprefix("/") for name in (arguments.a, arguments.b) if name]
     is_here = not arguments.namespace and not arguments.bag
     topics = topics_below(_namespace_here() if is_here else arguments.namespace)

@@ -108,7 +108,7 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
         return None
     plan = plan_of_domain()
     if plan is None and arguments.running:
-        fail("no robot runs in this ROS domain, or several; tfcompose ps lists them")
+        fail("not exactly one robot runs in this ROS domain; tfcompose ps lists the robots")
     return (plan, {}) if plan else None
 
 

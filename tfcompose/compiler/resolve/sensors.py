@@ -189,7 +189,7 @@ class _Mounting:
             message = (
                 f"{sensor.name}: the driver of {declared.preset} has no switch for its frames"
             )
-            advice = "tf: driver; or driver: none, where there is no device"
+            advice = "tf: driver; or driver: none, if there is no device"
             yield finding("TF604", message, self.span_of("tf"), help=advice)
         return STATIC
 
@@ -283,7 +283,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     if declared and declared.process is not None:
         return None, [*_check_driver(sensor, declared.process, validated)]
     if declared and declared.simulate:
-        advice = "driver: none, and tf: tfcompose, where there is no device"
+        advice = "driver: none and tf: tfcompose, if there is no device"
         return None, [
             finding(
                 "TF604",

@@ -108,7 +108,7 @@ def of_primitive(shape: Shape) -> Moments:
         ValueError: for a mesh, whose file would have to be read.
     """
     if shape.kind == "mesh":
-        raise ValueError("a mesh is no primitive")
+        raise ValueError("a mesh is not a primitive")
     volume, (x, y, z) = _SOLIDS[shape.kind](*shape.size)
     return Moments(volume, (0.0, 0.0, 0.0), (x, 0.0, 0.0, y, 0.0, z)).at(shape.pose)
 

@@ -68,8 +68,8 @@ class DescriptionPublisher:
                 del self._unnamed[gid]
                 say(
                     f"{name or 'a node without a name'} publishes another"
-                    f" {self.subscription.topic}: readers take the newest; TF stays as the plan"
-                    " says (to change it, build the robot anew and restart)"
+                    f" {self.subscription.topic}, and readers use the newest; TF keeps following"
+                    " the plan (to change TF, edit the robot file and restart)"
                 )
 
     def _name(self, gid: bytes | None) -> str | None:

@@ -167,7 +167,7 @@ class JointMover:
             return True
         if stamp_ns == source.last_ns:
             self._once(
-                "left out a joint state with the same time as the one before (reported once)"
+                "skipped a joint state with the same stamp as the previous one (reported once)"
             )
             return False
         # Half a period early is in time: the next one is due a period after this one was, so that
@@ -176,8 +176,8 @@ class JointMover:
         if self._period_ns and source.last_ns is not None and source.last_ns < stamp_ns < early_ns:
             hertz = _SECOND_NS / self._period_ns
             self._once(
-                f"joint states come with more than {hertz:g} Hz: some are left out, as"
-                " publish_frequency says"
+                f"joint states arrive at more than {hertz:g} Hz: some are skipped"
+                " (publish_frequency)"
             )
             return False
         behind = (

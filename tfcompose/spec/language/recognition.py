@@ -67,6 +67,6 @@ def load_named(text: str, file: str, of: type[Spec] | None = None) -> Source:
     if not is_recognized(text, keys) and not _NOTHING.fullmatch(text):
         advice = "it has none of a robot file's keys, such as links, frames or sensors"
         raise RejectedError(
-            [finding("TF002", "this is no file of a robot", Span(file), help=advice)]
+            [finding("TF002", "this is not a robot file", Span(file), help=advice)]
         )
     return load(text, file)

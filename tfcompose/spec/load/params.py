@@ -126,7 +126,7 @@ class _ParamsReader:
             if not isinstance(key, yaml.ScalarNode) or not isinstance(value, yaml.MappingNode):
                 span, advice = _span(self.file, key), f"/NODE: {{{PARAMETERS}: {{…}}}}"
                 self.result.findings.append(
-                    finding("TF018", "this is no node with parameters", span, help=advice)
+                    finding("TF018", "this is not a node with parameters", span, help=advice)
                 )
                 continue
             name = f"{above}/{key.value}" if above else key.value

@@ -240,7 +240,7 @@ def _configuration(environment: Mapping[str, str]) -> Finding | None:
         file = environment.get(name)
         if file and not Path(file).is_file():
             return finding(
-                "TF909", f"{name}={file}, and there is no such file", None, help=f"unset {name}"
+                "TF909", f"{name}={file}: the file does not exist", None, help=f"unset {name}"
             )
     return None
 

@@ -121,7 +121,7 @@ def nanoseconds(time: Any) -> int:
     if isinstance(time, int) and not isinstance(time, bool):
         return time
     raise TypeError(
-        f"{time!r} is no time: it has neither nanoseconds nor sec and nanosec, and is no int"
+        f"{time!r} is not a time: neither an int nor a message with nanoseconds or sec and nanosec"
     )
 
 

@@ -109,7 +109,7 @@ def _order(axes: str) -> tuple[bool, list[int]]:
         or order[1] in {order[0], order[2]}
     ):
         raise ValueError(
-            f"{axes!r} is no order of rotations: s or r and three axes, such as sxyz or rzyx"
+            f"{axes!r} is not an order of rotations: s or r and three axes, such as sxyz or rzyx"
         )
     return axes[0] == "s", order
 

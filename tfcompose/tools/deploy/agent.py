@@ -112,7 +112,7 @@ class Agent:
         found["problems"] = []
         missing = [file for file in self.setup if not Path(file).expanduser().is_file()]
         if missing:
-            found["problems"].append(f"there is no {missing[0]}, which setup names")
+            found["problems"].append(f"setup names {missing[0]}, which does not exist")
         else:
             done = self._program([self._executable(), "-c", _PROBE])
             try:
@@ -123,10 +123,10 @@ class Agent:
         if state.stdout.strip() in {"", "offline", "unknown"}:
             why = _last_line(state.stderr) or state.stdout.strip()
             found["problems"].append(
-                f"systemd does not run{'' if self.system else ' for this user'}: {why}"
+                f"systemd is not running{'' if self.system else ' for this user'}: {why}"
             )
         if self.system and os.getuid() != 0:
-            found["problems"].append("units of the system need root")
+            found["problems"].append("system units need root")
         found |= {
             "python": ".".join(map(str, sys.version_info[:3])),
             "base": str(self.base),
@@ -285,7 +285,7 @@ class Agent:
         except HostError as error:
             self.stop()
             self.start(release)
-            return f"started anew: {error}"
+            return f"restarted: {error}"
 
     def _follow(self, release: str, host: str) -> str:
         """Let the launcher follow a release.
@@ -297,7 +297,7 @@ class Agent:
         """
         folder = self._launched_folder()
         if folder is None:
-            raise HostError("its launcher is not a release's")
+            raise HostError("its launcher does not run a release")
         self.running = self.base / "releases" / release
         argv = [
             "up",
@@ -310,8 +310,8 @@ class Agent:
         ]
         done = self._tfcompose(argv, UNIT_S)
         if done.returncode != 0:
-            raise HostError(_last_line(done.stderr) or "its launcher does not follow")
-        return done.stdout.strip().rpartition("; ")[2] or "nothing starts again"
+            raise HostError(_last_line(done.stderr) or "its launcher did not take the release")
+        return done.stdout.strip().rpartition("; ")[2] or "nothing restarts"
 
     def wait(self, seconds: float) -> dict[str, Any]:
         """Return the status once the robot is ready or failed, or after the timeout."""

@@ -86,10 +86,12 @@ def run(arguments: Namespace) -> int:
     if find_spec("asyncssh") is None:
         fail("deploy needs the package asyncssh: pip install 'tfcompose[deploy]'", UNREADABLE)
     if is_plan(in_folder(arguments.file)):
-        fail(f"{arguments.file} is built, and deploy builds: name the robot file", UNREADABLE)
+        fail(
+            f"{arguments.file} is a built plan, but deploy builds: name the robot file", UNREADABLE
+        )
     wheels = Path(arguments.wheels) if arguments.wheels else None
     if wheels and not any(wheels.glob("*.whl")):
-        fail(f"there is no wheel in {wheels}", UNREADABLE)
+        fail(f"no wheels in {wheels}", UNREADABLE)
     robot, _ = compile_without_errors(arguments.file, arguments)
     import asyncio
 

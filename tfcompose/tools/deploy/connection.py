@@ -115,11 +115,11 @@ class ConnectedHost:
                 self._process.stdin.write(f"{json.dumps([request, arguments])}\n".encode())
                 answer = await asyncio.wait_for(self._answer(), timeout_s)
             except asyncio.TimeoutError:
-                raise LostError(f"does not answer within {timeout_s:g} s") from None
+                raise LostError(f"did not answer within {timeout_s:g} s") from None
             except (OSError, asyncssh.Error, ValueError) as error:
-                raise LostError(f"is lost: {error}") from None
+                raise LostError(f"lost its connection: {error}") from None
         if answer is None:
-            raise LostError("is lost: the connection has ended")
+            raise LostError("closed the connection")
         if "error" in answer:
             raise RefusedError(answer["error"])
         return answer["answer"]
@@ -193,10 +193,10 @@ async def connect_host(
     except asyncssh.PermissionDenied:
         advice = f"allow your key there: ssh-copy-id {_in_words(host)}"
         return _unreachable(
-            name, f"{host.ssh} does not let you in without a password", span, advice
+            name, f"{host.ssh} asks for a password, and deploy needs a key", span, advice
         )
     except asyncio.TimeoutError:
-        return _unreachable(name, f"{host.ssh} does not answer within {CONNECT_S:g} s", span)
+        return _unreachable(name, f"{host.ssh} did not answer within {CONNECT_S:g} s", span)
     except (OSError, asyncssh.Error) as error:
         return _unreachable(
             name,

@@ -181,12 +181,18 @@ def _add_named_files(named: Mapping[str, str]) -> list[str]:
             size += path.stat().st_size
             waiting += _files_named_in(path)
         else:
-            raise RejectedError([finding("TF912", f"{path} is named, and does not exist", None)])
+            raise RejectedError(
+                [finding("TF912", f"{path} does not exist, and the robot needs it", None)]
+            )
         if len(found) + len(waiting) > MOST_FILES or size > MOST_BYTES:
             most = f"{MOST_FILES:,} files or {MOST_BYTES // 10**9} GB"
             advice = "name a folder with only what the robot needs"
             raise RejectedError(
-                [finding("TF912", f"what the robot names is more than {most}", None, help=advice)]
+                [
+                    finding(
+                        "TF912", f"the files that the robot names exceed {most}", None, help=advice
+                    )
+                ]
             )
     return sorted(found)
 

@@ -101,9 +101,7 @@ class Share:
         """Return a description of the host."""
         probe = self.probe
         version = f"tfcompose {probe['tfcompose']}" if probe["tfcompose"] else "no tfcompose"
-        logout = (
-            "" if probe["lingers"] else ", ends at logout (loginctl enable-linger lets it stay)"
-        )
+        logout = "" if probe["lingers"] else ", stops at logout unless: loginctl enable-linger"
         return f"Python {probe['python']}, {version}{logout}"
 
     def changes(self) -> list[str]:
@@ -220,10 +218,10 @@ class Rollout:
         return [
             finding(
                 "TF914",
-                f"{self.target.plan.robot} runs on {share.name} already, and not as"
+                f"{self.target.plan.robot} is already running on {share.name}, but not as"
                 f" {share.unit.file}: pid {share.state['stranger']}",
                 share.host.span,
-                help=f"there: tfcompose down --robot {share.unit.name}",
+                help=f"stop it there: tfcompose down --robot {share.unit.name}",
             )
             for share in self.shares
             if share.state["stranger"]
@@ -258,7 +256,7 @@ class Rollout:
             for path in paths:
                 before, after = texts.get(path), share.wanted.texts.get(path)
                 if before is None and after is None:
-                    lines.append(f"{share.name}/{path}: differs, and is no text")
+                    lines.append(f"{share.name}/{path}: differs (not text)")
                     continue
                 names = (f"{share.name}/{path} (there)", f"{share.name}/{path} (here)")
                 lines += difflib.unified_diff(
@@ -280,7 +278,7 @@ class Rollout:
             if answer["holder"]:
                 message = f"{answer['holder']} is deploying to {share.name}"
                 raise RejectedError(
-                    [finding("TF915", message, share.host.span, help="wait until that has ended")]
+                    [finding("TF915", message, share.host.span, help="wait until it has finished")]
                 )
 
     async def send(self) -> None:
@@ -366,8 +364,8 @@ class Rollout:
         try:
             await self._ask(share, "settle")
         except RejectedError as error:
-            notes = (Note("everything was live, and the other hosts keep the release"),)
-            advice = "deploy again once it is back: it may have returned to the release before"
+            notes = (Note("every edge was live, and the other hosts keep the release"),)
+            advice = "deploy again once it is back: it may have returned to the previous release"
             raise RejectedError([replace(error.findings[0], notes=notes, help=advice)]) from None
 
     async def _until_live(self, begun: float) -> str:
@@ -404,9 +402,7 @@ class Rollout:
             share.state, share.goal = states[share.name], states[share.name]["previous"] or ""
             if not share.goal:
                 findings.append(
-                    finding(
-                        "TF912", f"{share.name} has no release before this one", share.host.span
-                    )
+                    finding("TF912", f"{share.name} has no previous release", share.host.span)
                 )
         if findings:
             raise RejectedError(findings)
@@ -468,17 +464,17 @@ class Rollout:
             if isinstance(answer, BaseException):
                 notes.append(
                     Note(
-                        f"{share.name} {answer}; it returns to the previous release when it can,"
-                        " or at its next boot"
+                        f"{share.name} {answer}; it returns to the previous release as soon as it"
+                        " can, at the latest at its next boot"
                     )
                 )
             elif answer is None:
                 continue
             elif answer["release"]:
-                runs = "" if answer["active"] else ", which does not run, as before"
+                runs = "" if answer["active"] else ", stopped as before"
                 notes.append(Note(f"{share.name} returned to release {answer['release']}{runs}"))
             else:
-                notes.append(Note(f"{share.name} had no release before, and runs nothing"))
+                notes.append(Note(f"{share.name} had no previous release and runs nothing"))
         return notes
 
     # How hosts are asked.
@@ -559,7 +555,7 @@ def target_of(
             [finding("TF912", f"{plan.robot} has no hosts to deploy to", None, help=advice)]
         )
     if nowhere := without_computer(plan):
-        message = f"{list_names(nowhere, NAMED_AT_MOST)} would run on no host"
+        message = f"{list_names(nowhere, NAMED_AT_MOST)} would have no host"
         advice = (
             "processes without a host run where static does: processes: {static: {host:"
             f" {next(iter(plan.hosts))}}}}}"
@@ -568,7 +564,7 @@ def target_of(
     findings = []
     for name in names:
         if name not in used:
-            known = f"there is {', '.join(used)}"
+            known = f"hosts with processes: {', '.join(used)}"
             message = f"no process of {plan.robot} runs on a host named {name}"
             findings.append(finding("TF819", message, None, help=did_you_mean(name, used, known)))
     shares = [share_of(plan, name, "") for name in used]

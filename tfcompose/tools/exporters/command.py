@@ -104,7 +104,7 @@ def _kind(text: str) -> str:
         ArgumentTypeError: if it is called otherwise here.
     """
     if text == "kubernetes":
-        raise ArgumentTypeError("kubernetes is k8s here")
+        raise ArgumentTypeError("write k8s for kubernetes")
     return text
 
 
@@ -161,7 +161,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
     print(f"wrote {folder}: {', '.join(file.path for file in files)}")
     if plan.host is None:
         differences += [
-            f"{process.name} runs on {process.host}, and is here too: --host"
+            f"{process.name} of host {process.host} is included: --host leaves it out"
             for process in plan.started
             if process.host
         ]

@@ -368,9 +368,9 @@ class _Export:
         ]
         if rest:
             self.gaps.append(
-                f"{process.name} does not wait for {', '.join(rest)}: launch knows no readiness"
+                f"{process.name} does not wait for {', '.join(rest)}: launch has no readiness"
             )
-        self.gaps += [f"{process.name} is started also when {name} fails" for name in before]
+        self.gaps += [f"{process.name} also starts if {name} fails" for name in before]
 
     def _texts_of(self, process: PlanProcess, place: str) -> dict[str, Text]:
         """Return the texts of a place (args, env, params, remap) that the launch file makes."""
@@ -395,8 +395,7 @@ class _Export:
         loads = [component.name for component in self._components.get(process.name, [])]
         if loads and process.restart != "no":
             yield (
-                f"when {process.name} is started again, it has none of its components:"
-                f" {', '.join(loads)}"
+                f"a restarted {process.name} comes back without its components: {', '.join(loads)}"
             )
 
     def _start(self, process: PlanProcess) -> CodeBlock:
@@ -524,7 +523,7 @@ class _Export:
         Its condition is here if its container's action loads it.
         """
         if process.component is None:
-            raise ValueError(f"{process.name} is no component")
+            raise ValueError(f"{process.name} is not a component")
         found = process.component
         params = {
             name: self._python(process, ros_value(value)) for name, value in found.params.items()
@@ -633,11 +632,11 @@ def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
 
 def _unlike(process: PlanProcess) -> Iterator[str]:
     if process.component and process.lifecycle:
-        yield f"{process.name} is a component, and is not brought into its lifecycle state"
+        yield f"{process.name} is a component: launch does not set its lifecycle state"
     if process.kind == "run" and process.lifecycle and not _is_node(process):
         yield (
-            f"{', '.join(process.lifecycle)} of {process.name} is not brought into its lifecycle"
-            " state"
+            f"launch does not set the lifecycle state of {', '.join(process.lifecycle)} in"
+            f" {process.name}"
         )
     for key in PROCESS_KEYS:
         if key.launch is None or not key.is_set(process):
@@ -647,7 +646,7 @@ def _unlike(process: PlanProcess) -> Iterator[str]:
         elif key.launch.of_file:
             yield from key.launch.of_file(process)
         else:
-            yield f"{process.name} is a launch file, which has no {key.name} here"
+            yield f"{process.name} is a launch file, for which launch has no {key.name}"
 
 
 def _variables(plan: Plan) -> Iterator[tuple[str, str]]:

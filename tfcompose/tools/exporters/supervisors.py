@@ -128,17 +128,15 @@ def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
     exported = exported_processes(plan)
     gaps = []
     if plan.guard.on_violation != "report":
-        gaps.append(
-            f"the guard reports: nobody here follows on_violation: {plan.guard.on_violation}"
-        )
+        gaps.append(f"the guard only reports, without on_violation: {plan.guard.on_violation}")
     if plan.guard.mode == "strict":
         gaps.append(
-            "the fence is one of remappings; what a sender latched before its last message ends"
-            " with the guard"
+            "the fence uses remappings; latched messages before a sender's last one are lost when"
+            " the guard exits"
         )
     for process in plan.processes:
         if process.kind == "external":
-            gaps.append(f"{process.name} is external, and not started")
+            gaps.append(f"{process.name} is external: start it yourself")
         for dialect in dialects:
             gaps += dialect.gaps(exported[process.name])
         component = process.component
@@ -150,8 +148,8 @@ def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
                 )
             elif not component and (other := plan.process(name).component):
                 gaps.append(
-                    f"{process.name} waits for the container {other.container}, and not until it"
-                    f" has {name}"
+                    f"{process.name} waits for the container {other.container}, but not for"
+                    f" {name} in it"
                 )
     return gaps
 
@@ -254,11 +252,11 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
             other = plan.process(name)
             if what == "ready" and other.kind == "run" and not waiting_s(other, what):
                 gaps.append(
-                    f"{process.name} waits until {name} was executed: systemd cannot see that it"
-                    " is ready"
+                    f"{process.name} waits only until {name} was executed: systemd cannot tell"
+                    " when it is ready"
                 )
             if what == "started" and _settling_s(plan, other):
-                gaps.append(f"{process.name} waits until {name} is ready, as others do")
+                gaps.append(f"{process.name} waits until {name} is ready, not only started")
     return (File(_target_name(plan), _target(plan, [unit.path for unit in units])), *units), gaps
 
 
@@ -367,8 +365,8 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
             other = plan.process(name)
             if what == "ready" and other.kind != "external" and not plan.edges_of(name):
                 gaps.append(
-                    f"{process.name} waits until {name} was started: compose cannot see that it is"
-                    " ready"
+                    f"{process.name} waits only until {name} was started: compose cannot tell"
+                    " when it is ready"
                 )
             if other.kind != "external" and _profile(plan, other) not in (
                 None,

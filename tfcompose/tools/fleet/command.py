@@ -145,7 +145,7 @@ def _share(spec: FleetSpec, robot: str, namespace: str | None) -> int:
     from tfcompose.tf.ros.environment import RosError
 
     if robot not in spec.robots:
-        advice = did_you_mean(robot, spec.robots, f"there is {', '.join(spec.robots)}")
+        advice = did_you_mean(robot, spec.robots, f"its robots: {', '.join(spec.robots)}")
         fail(f"no robot {robot} in the fleet {spec.name}; {advice}", UNREADABLE)
     set_up_ros()
     from tfcompose.tools.fleet.robot import share  # rclpy reads the environment when it is loaded
@@ -179,7 +179,7 @@ def _report(observer: FleetObserver, arguments: Namespace) -> int:
         else:
             print_findings(findings, sys.stdout)
             print(
-                f"looked at {len(observer.fleet.robots)} robots: {len(findings) or 'nothing is'}"
+                f"checked {len(observer.fleet.robots)} robots: {len(findings) or 'nothing is'}"
                 " wrong"
             )
         return exit_code_of(findings) if findings else 0

@@ -88,7 +88,7 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
     if name not in fleet.robots:
         span = section.span_of("robot") if member.robot else spec.span_of(("robot",))
         known = (
-            f"there is {list_names(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
+            f"robots: {list_names(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
             " NAME}"
         )
         advice = did_you_mean(name, fleet.robots, known)

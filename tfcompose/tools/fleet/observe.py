@@ -168,8 +168,8 @@ class FleetObserver:
             edges = [edge for edge in robot.edges if edge.child in needed]
             if edges and robot.age_s is None and is_shared:
                 raise StaleError(
-                    f"{robot.robot} is {robot.state}: nothing came from it"
-                    " (tfcompose fleet doctor)"
+                    f"{robot.robot} is {robot.state}: no message arrived from it"
+                    " (see tfcompose fleet doctor)"
                 )
             if edges and robot.age_s is not None and robot.age_s > STALE_S:
                 raise StaleError(f"the link to {robot.robot} is stale")
@@ -270,11 +270,7 @@ class FleetObserver:
 def problems_of(robot: FleetRobotStatus) -> Iterator[Finding]:
     """Yield what is wrong with a robot."""
     if robot.state == "unreachable":
-        ago = (
-            f", and there was no message for {robot.age_s:.1f} s"
-            if robot.age_s is not None
-            else ""
-        )
+        ago = f"; its last message is {robot.age_s:.1f} s old" if robot.age_s is not None else ""
         advice = (
             "is the robot on, and in this network? Its router is the process zenoh_router, or"
             " zenohd"
@@ -300,7 +296,7 @@ def problems_of(robot: FleetRobotStatus) -> Iterator[Finding]:
         return
     if robot.state == "silent":
         advice = f"start it on the robot: tfcompose fleet share {robot.robot}"
-        message = f"{robot.robot} shares nothing: its router can be reached, but no message came"
+        message = f"{robot.robot} shares nothing: its router answers, but no message arrived"
         yield finding("TF883", message, None, help=advice)
         return
     if robot.delay_s > CLOCK_S:

@@ -95,7 +95,7 @@ class FleetRobot(Spec):
 class FleetSpec(Spec):
     """A fleet of robots."""
 
-    HABITS: ClassVar[dict[str, str]] = {"tfcompose": "a fleet's file begins with fleet: 1"}
+    HABITS: ClassVar[dict[str, str]] = {"tfcompose": "a fleet file begins with fleet: 1"}
 
     fleet: Literal[1] = key(..., "the version of this language", 1)
     name: Name = key("fleet", "the name; fleets with different names are separate", "warehouse")

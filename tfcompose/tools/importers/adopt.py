@@ -65,7 +65,7 @@ def _draft_of_launch_file(arguments: Namespace) -> ImportDraft:
 
     file = arguments.file
     if not file.endswith(_LAUNCH_ENDINGS):
-        fail(f"{file} is no launch file: adopt takes one, --live or --bag", UNREADABLE)
+        fail(f"{file} is not a launch file: adopt takes one, or --live or --bag", UNREADABLE)
     name = posixpath.basename(file)
     robot = arguments.robot or robot_name(name.partition(".")[0])
     draft = ImportDraft(robot, [f"adopted from {name} by tfcompose"], is_adopted=True)
@@ -105,7 +105,7 @@ def _print_status(arguments: Namespace) -> int:
     source = with_includes(load(text, file), read_text)
     publishers = _draft_of_launch_file(arguments).publishers if arguments.file else {}
     lines = list(_status(compiled.robot, source, publishers))
-    print("\n".join(lines) if lines else f"{file}: no fixed edge is left to be handed over")
+    print("\n".join(lines) if lines else f"{file}: no fixed edge left to hand over")
     return 0
 
 

@@ -187,7 +187,7 @@ def _import_bringup(arguments: Namespace) -> int:
 def _refuse_more(arguments: Namespace) -> None:
     if arguments.more:
         fail(
-            f"{arguments.more[0]} is not NAME:=VALUE, and only calibrations can be several files",
+            f"{arguments.more[0]} is not NAME:=VALUE, and only calibrations can be many files",
             UNREADABLE,
         )
 
@@ -344,7 +344,7 @@ def finish(draft: ImportDraft, arguments: Namespace) -> int:
 
     if draft.is_empty():
         print_findings(draft.findings, sys.stderr)
-        fail("nothing was written: the source starts nothing that a robot file has")
+        fail("nothing was written: a robot file can express nothing of the source")
     folder = posixpath.dirname(arguments.output or "")
     neighbours = {posixpath.join(folder, path): text for path, text in draft.neighbours.items()}
     _write_neighbours(neighbours, arguments)
@@ -366,7 +366,7 @@ def _write_neighbours(files: dict[str, str], arguments: Namespace) -> None:
     from tfcompose.foundation.reading import exists
 
     if not arguments.output:
-        message = "{}, which the robot file names, is written only beside a robot file"
+        message = "{}, which the robot file names, is only written together with a robot file"
         advice = "import … -o FILE writes both"
         findings = [finding("TF020", message.format(path), None, help=advice) for path in files]
         print_findings(findings, sys.stderr)

@@ -285,7 +285,7 @@ def text_with_findings(
             "base_link",
             {},
             None,
-            "the source says nothing of frames: those of the robot belong here",
+            "the source describes no frames: add those of the robot here",
         )
     compiled = lint(draft.text())
     errors = {error.code for error in compiled.errors}

@@ -101,7 +101,7 @@ def add_autoware(draft: ImportDraft, source: Source) -> None:
                 isinstance(value, (int, float)) and not isinstance(value, bool)
                 for value in numbers
             ):
-                draft.todo(f"{child}: its values are no numbers", span)
+                draft.todo(f"{child}: its values are not numbers", span)
                 continue
             x, y, z, roll, pitch, yaw = map(float, numbers)
             rpy = (roll, pitch, yaw)
@@ -217,7 +217,9 @@ def _one_of(
     if not known:
         message = f"no {' or '.join(_CALIBRATIONS)} below config/VEHICLE/KIT"
         raise RejectedError([finding("TF002", message, Span(folder))])
-    message = f"there is no {what} {wanted}" if wanted else f"several {what}s: {', '.join(known)}"
+    message = (
+        f"there is no {what} {wanted}" if wanted else f"more than one {what}: {', '.join(known)}"
+    )
     raise RejectedError(
         [finding("TF002", message, Span(folder), help=f"{argument}:={'|'.join(known)}")]
     )

@@ -105,7 +105,7 @@ def add_launch(draft: ImportDraft, launch: Launch, target: Target) -> list[Descr
             for record in answer["records"]
         ):
             raise RejectedError([finding("TF002", answer["stopped"], span), *draft.findings])
-        draft.todo(f"the launch file is not read to its end: {answer['stopped']}", span)
+        draft.todo(f"the launch file was read only in part: {answer['stopped']}", span)
     return work.descriptions
 
 
@@ -210,7 +210,7 @@ class _LaunchImport:
         }
         if unread:
             named = f"the launch argument{'' if len(unread) == 1 else 's'} {', '.join(unread)}"
-            self.draft.todo(f"nothing that is imported reads {named}", next(iter(unread.values())))
+            self.draft.todo(f"nothing imported reads {named}", next(iter(unread.values())))
         fixed: dict[str, Span] = {}
         for name, (record, span) in self._arguments.items():
             value, path = record["value"], ("args", name)
@@ -305,7 +305,7 @@ class _LaunchImport:
             return
         program = replace(self._program(record, span), plugin=plugin)
         if not program.name:
-            unnamed = "the name that its class gives the component: here it has another"
+            unnamed = "the name that its class gives the component: here it differs"
             program = replace(program, todo=(*program.todo, unnamed))
         name = add_program(self.draft, program, self.target) or ""
         self._keep_started(record, name)
@@ -324,7 +324,7 @@ class _LaunchImport:
                     {"node": node} if node != free else {}
                 )
                 keys |= {"namespace": namespace} if namespace else {}
-                note = where(span, "the source starts no such container: it is started elsewhere")
+                note = where(span, "the source does not start this container: it starts elsewhere")
                 self._containers[wanted] = self.draft.process(
                     free, keys, note, section="containers"
                 )
@@ -406,7 +406,7 @@ class _LaunchImport:
             if value is not None:
                 keys[row.name] = self._in_language(value)
         if record.get("only_env"):
-            todo.append("env replaces the environment: here its variables are added to it")
+            todo.append("env replaces the environment in the source; here it adds to it")
         return keys
 
     def _in_language(self, value: Any) -> Any:
@@ -425,7 +425,7 @@ class _LaunchImport:
         if described is None and program.argv and program.argv[0].endswith(".urdf"):
             described = Description(file=program.argv[0])
         if described is None:
-            self.draft.todo("robot_state_publisher without a description that is known here", span)
+            self.draft.todo("robot_state_publisher without a known description", span)
             return
         rest = {key: value for key, value in params.items() if key != "robot_description"}
         self._state_publisher_params(rest, program, span)
@@ -511,7 +511,7 @@ class _LaunchImport:
     def _keep_required(self, record: dict[str, Any], span: Span) -> None:
         name = self._names.get(str(record["node"]))
         if name is None:
-            self.draft.todo("the end of a process ends all", span)
+            self.draft.todo("the end of a process that stops everything", span)
         else:
             self.draft.started_entries()[name]["required"] = True
 

@@ -264,7 +264,7 @@ def _describe_end(outcome: Outcome) -> str:
     if outcome.refused:
         return f"was ended: {outcome.refused}"
     if outcome.answer is not None:
-        return "was ended: its answer is none"
+        return "was ended: its answer is invalid"
     if outcome.code >= 0:
         return f"ends the process that reads it, with code {outcome.code}"
     return _describe_signal(-outcome.code)
@@ -275,6 +275,6 @@ def _describe_signal(number: int) -> str:
     if number == signal.SIGXCPU:
         return "takes too long"
     if number == signal.SIGKILL:
-        return "was killed by the system, or by somebody: it may have needed too much memory"
+        return "was killed, perhaps because it needed too much memory"
     name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
-    return f"was ended by {name}, which it raised itself, or a module that it loads"
+    return f"was ended by {name}, from its own code or from a module that it loads"

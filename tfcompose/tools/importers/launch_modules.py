@@ -130,7 +130,7 @@ class _NotInstalled(_Finder):
         return importlib.machinery.ModuleSpec(fullname, self, is_package=True)
 
     def create_module(self, spec: Any) -> Any:
-        self._context.todo(here(), f"the module {spec.name} is not installed here")
+        self._context.todo(here(), f"the module {spec.name} is not installed")
         return _Module(spec.name)
 
 

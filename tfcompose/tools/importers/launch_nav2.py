@@ -154,7 +154,7 @@ def _mapping_in(text: str, file: str) -> Any:
     try:
         data = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise FailedError(f"{file} is no YAML: {error}") from None
+        raise FailedError(f"{file} is not YAML: {error}") from None
     if not isinstance(data, dict):
         raise FailedError(f"{file} has no parameters")
     return data

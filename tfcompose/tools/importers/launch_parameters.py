@@ -237,7 +237,7 @@ def file_of_text(file: str, source: str, text: str, at: Any, context: RecordingC
         raise FailedError(f"{relative(file)} takes what a command makes of a file")
     unknown = set(re.findall(rf"{PACKAGE}\w+", text)) - set(re.findall(rf"{PACKAGE}\w+", source))
     for name in sorted(unknown):
-        context.todo(at, f"{relative(file)} names {name}, a package that is not found here")
+        context.todo(at, f"{relative(file)} names the package {name}, which was not found")
     return context.file_of_text(file, text)
 
 
@@ -356,7 +356,7 @@ def _convert(text: str) -> Any:
     try:
         value = yaml.safe_load(text) if text else ""
     except yaml.YAMLError:
-        raise FailedError(f"the value {text!r} of a parameter is no YAML") from None
+        raise FailedError(f"the value {text!r} of a parameter is not YAML") from None
     return value if isinstance(value, (bool, int, float, str, list)) else text
 
 

@@ -168,7 +168,7 @@ def _watch(  # noqa: C901 (one hook after another)
             raise PermissionError(f"{event} is not done while launch files are read")
         if event in _READS and not may_read(args[0]):
             note(f"{event} {os.fsdecode(args[0])}, which it may not read")
-            raise PermissionError(errno.EACCES, "It may not be read", os.fsdecode(args[0]))
+            raise PermissionError(errno.EACCES, "Reading it is not allowed", os.fsdecode(args[0]))
 
     def may_read(path: Any) -> bool:
         if isinstance(path, int) or path is None or readable is None:

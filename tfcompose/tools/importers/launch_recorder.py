@@ -173,7 +173,7 @@ def visit_all(entities: Any, context: RecordingContext) -> None:
         elif hasattr(entity, "visit"):
             visit_all(entity.visit(context), context)
         elif entity is not None:
-            context.todo(context.at, f"{type(entity).__name__} is no action")
+            context.todo(context.at, f"{type(entity).__name__} is not an action")
 
 
 def _visit(action: Any, context: RecordingContext) -> None:
@@ -234,7 +234,7 @@ def _execute(made: Any, execute: Callable[[], None], context: RecordingContext) 
 def _let_launch(action: Any, context: RecordingContext) -> None:
     """Let an action do what it does, and visit what it gives."""
     if isinstance(action, launch.actions.ExecuteLocal):
-        raise FailedError("it starts a process in a way that is not known here")
+        raise FailedError("it starts a process in an unknown way")
     visit_all(evaluate(action.execute, context), context)
 
 
@@ -433,7 +433,7 @@ def _wait(action: Any, context: RecordingContext) -> None:
     try:
         period_s = float(text)
     except ValueError:
-        raise FailedError(f"{text!r} is no time") from None
+        raise FailedError(f"{text!r} is not a time") from None
     context.period_s += period_s
     context.visit_later(partial(visit_all, list(arguments["actions"]), context))
     context.period_s -= period_s
@@ -460,7 +460,7 @@ def _describe_location(action: Any) -> str:
 def _include(action: Any, context: RecordingContext) -> None:
     location = _location_of(action)
     if isinstance(location, LaunchDescriptionSource):
-        raise FailedError("its source is not known here")
+        raise FailedError("its source is unknown")
     arguments = _set_arguments(action, context)
     if isinstance(location, launch.LaunchDescription):
         visit_all([location], context)
@@ -702,7 +702,7 @@ def _load(action: Any, components: Any, container: str, context: RecordingContex
     """Record components; ``container`` is their action's id or its node's full name."""
     for component in components or ():
         if not isinstance(component, launch_ros.descriptions.ComposableNode):
-            context.todo(place_of(action), f"{type(component).__name__} is no component")
+            context.todo(place_of(action), f"{type(component).__name__} is not a component")
             continue
         condition = arguments_of(component).get("condition")
         _if_holds(

@@ -149,7 +149,7 @@ def _root(file: str) -> Element:
         finding = error.findings[0]
         raise FailedError(finding.message, finding.span.line if finding.span else 0) from None
     if root.tag != "launch":
-        raise FailedError(f"<{root.tag}> is no launch file")
+        raise FailedError(f"<{root.tag}> is not a launch file")
     return root
 
 
@@ -444,7 +444,7 @@ def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise FailedError(f"{text!r} is no number") from None
+        raise FailedError(f"{text!r} is not a number") from None
 
 
 def _group(element: _Attributes, recording: Ros1Recording) -> None:

@@ -116,11 +116,11 @@ class SavedFiles:
         """Report the other things that would have been made."""
         for path, at in self._folders.items():
             if not any(PurePath(file).is_relative_to(path) for file in self.texts):
-                self._recording.todo(at, f"the folder {path} would be made: not done")
+                self._recording.todo(at, f"the folder {path} was not created")
         for path, at in self._temporary.items():
             if path not in self.texts:
                 self._recording.todo(
-                    at, f"the temporary file {path}: its name is a new one at each launch"
+                    at, f"the temporary file {path}: its name changes at each launch"
                 )
 
 

@@ -81,10 +81,10 @@ def params_of(
             params = {key: bring_files(value, draft) for key, value in param_set.items()}
             by_node = [(full if index in program.exact else _ANY, params)]
         elif param_set.startswith(PACKAGE):
-            left.append(f"the parameters of {param_set}: the package is not found here")
+            left.append(f"the parameters of {param_set}: the package was not found")
             continue
         elif param_set not in draft.made and not is_file(posixpath.join(target.top, param_set)):
-            left.append(f"the parameters of {param_set}, which is not there")
+            left.append(f"the parameters of {param_set}, which does not exist")
             continue
         else:
             files.append(
@@ -93,8 +93,7 @@ def params_of(
             nodes = _nodes_in(param_set, draft)
             if nodes is None and any(sections.values()):
                 left.append(
-                    f"{param_set} is laid over the parameters before it: here they are laid over"
-                    " the file"
+                    f"{param_set} overrides the parameters before it: here they override the file"
                 )
             by_node = [(each.name, dict(_by_full_name(each.params, ""))) for each in nodes or ()]
             for name, params in by_node:

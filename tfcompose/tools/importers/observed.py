@@ -231,7 +231,7 @@ class Observed:
 #: How ROS 2's static_transform_publisher names its node unless it is told.
 _ANONYMOUS = re.compile(r"static_transform_publisher_[A-Za-z0-9]{16}")
 _ANEW = (
-    "its node has another name at each start: name it by -r __node:=NAME, or remove owner and"
+    "its node name changes at each start: set it with -r __node:=NAME, or remove owner and"
     " static at its frames"
 )
 

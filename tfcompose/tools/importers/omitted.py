@@ -59,7 +59,7 @@ def omitted_notes(document: Document) -> Notes:
             notes.setdefault(path, []).append(f"left out: {', '.join(left_out)}")
         if _has_no_ends(element):
             notes.setdefault(path, []).append(
-                "the source gives no lower and upper limit, and parsers take 0"
+                "the source gives no lower and upper limit, which parsers read as 0"
             )
     for (
         finding

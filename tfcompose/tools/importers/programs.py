@@ -100,7 +100,7 @@ def _add_external(draft: ImportDraft, program: Program) -> str:
     namespace = (program.namespace or "").strip("/")
     if program.name is None:
         draft.todo(
-            f"{PROGRAM} has another node name at each start",
+            f"{PROGRAM} changes its node name at each start",
             program.span,
             advice="name its node in the launch file, or hand its edge over first",
         )
@@ -201,7 +201,7 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     draft.process(name, keys, *(note for note in notes if note), section=section)
     for argument in _texts((*program.argv, *program.env.values())):
         if PACKAGE in argument and not _is_literal(argument, span, draft):
-            todo.append(f"{argument} is in a package that is not found here: write its path")
+            todo.append(f"{argument} is in a package that was not found: write its path")
             advice = "--package NAME=FOLDER, or source the workspace's setup file"
     for message in (*todo, *params.left):
         draft.todo(message, span, (section, name), advice)

@@ -375,7 +375,7 @@ class _Script:
             not begin and argv[0] not in {"ros2", "rosrun"} and PROGRAM in " ".join(argv[1:])
         )
         if starts_publisher or (before and before[0] not in _PREFIXES):
-            self._todo(command, f"what {argv[0]} starts is not known here")
+            self._todo(command, f"it is unknown what {argv[0]} starts")
             return
         keys = {"prefix": before} if before else {}
         env = {
@@ -472,7 +472,7 @@ def add_script(draft: ImportDraft, text: str, file: str, target: Target) -> None
         raise RejectedError(
             [
                 finding(
-                    "TF002", "no shell script, and nothing of ROS in it", Span(file), help=advice
+                    "TF002", "not a shell script, or without ROS commands", Span(file), help=advice
                 )
             ]
         )

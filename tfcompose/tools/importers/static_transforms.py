@@ -89,7 +89,7 @@ def static_transform(argv: Sequence[str], reader: Reader = "ros2") -> StaticTran
         return _by_name(options)
     if options:
         raise ArgumentsRefusedError(
-            f"{loose[0]} stands beside {next(iter(options))}: arguments are by name or in order"
+            f"{loose[0]} next to {next(iter(options))}: give arguments by name or in order"
         )
     return _in_order(loose, reader)
 
@@ -128,7 +128,7 @@ def _by_name(options: dict[str, str]) -> StaticTransform:
     x, y, z = (numbers.get(key, 0.0) for key in _POSITION)
     has_angles = any(key in numbers for key in _ANGLES)
     if has_angles and any(key in numbers for key in _QUATERNION):
-        raise ArgumentsRefusedError("angles and a quaternion at once")
+        raise ArgumentsRefusedError("both angles and a quaternion")
     parent, child = (options.get(key, "") for key in _FRAMES)
     if any(key in numbers for key in _QUATERNION):
         usual = (0.0, 0.0, 0.0, 1.0)
@@ -156,8 +156,7 @@ def _in_order(argv: list[str], reader: Reader) -> StaticTransform:
         and not _is_number(kept[-3])
     ):
         raise ArgumentsRefusedError(
-            f"{kept[-1]} behind the frames is the period of ROS 1's tf, which this program does"
-            " not take"
+            f"{kept[-1]} after the frames is a period, as in ROS 1's tf; this program takes none"
         )
     if len(kept) not in {_WITH_ANGLES, _WITH_QUATERNION}:
         raise ArgumentsRefusedError(f"{len(kept)} arguments; it takes 8, or 9 with a quaternion")

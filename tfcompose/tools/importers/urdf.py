@@ -119,10 +119,12 @@ def _add_links(draft: ImportDraft, described: Description, workshop: Workshop) -
         own = replace(packages.disk, read=lambda _: text)
         packages, file = Packages(own, packages.named, packages.advice), _TEXT
     elif file.startswith(PACKAGE):
-        draft.todo(f"the description {file}: its package is not found here", described.span)
+        draft.todo(f"the description {file}: its package was not found", described.span)
         return
     elif not draft.reach.allows(file):
-        draft.todo(f"the description {file}: it may not be read", described.span, advice=_OUTSIDE)
+        draft.todo(
+            f"the description {file}: reading it is not allowed", described.span, advice=_OUTSIDE
+        )
         return
     try:
         document = read_urdf(file, packages)

@@ -79,7 +79,7 @@ def bag_at(path: Path) -> Bag:
     if path.name == METADATA:
         path = path.parent
     if not exists(path):
-        raise BagError(f"there is no bag {path}")
+        raise BagError(f"{path} does not exist")
     if not is_folder(path):
         if path.suffix not in ENDINGS:
             raise BagError(f"{path} is not a recording: those end in .mcap or .db3")
@@ -103,7 +103,7 @@ def _information_in(file: Path) -> dict[str, Any]:
     except (yaml.YAMLError, KeyError, TypeError, RecursionError, ValueError):
         information = None
     if not isinstance(information, dict):
-        raise BagError(f"{file} is no metadata of a bag", "ros2 bag reindex writes it anew")
+        raise BagError(f"{file} is not the metadata of a bag", "ros2 bag reindex rewrites it")
     return information
 
 
@@ -115,7 +115,7 @@ def _file_names(information: dict[str, Any], path: Path) -> Iterator[str]:
     """
     names = information.get("relative_file_paths")
     if not isinstance(names, list) or not names:
-        raise BagError(f"{path} names no file", "ros2 bag reindex writes metadata.yaml anew")
+        raise BagError(f"{path} names no file", "ros2 bag reindex rewrites metadata.yaml")
     for name in map(str, names):
         if Path(name).name != name or Path(name.removesuffix(_ZSTD)).suffix not in ENDINGS:
             raise BagError(f"{path}: {name} is no .mcap or .db3 file in that folder")

@@ -149,7 +149,7 @@ def _camera_infos(arguments: Namespace) -> dict[str, CameraInfo]:
         try:
             infos[topic] = camera_info_in(read_text(file))
         except CameraInfoError as error:
-            findings.append(finding("TF926", f"{file} is no camera calibration: {error}", None))
+            findings.append(finding("TF926", f"{file} is not a camera calibration: {error}", None))
         except RejectedError as error:
             findings += error.findings
     if findings:

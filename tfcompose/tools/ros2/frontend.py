@@ -57,7 +57,7 @@ class RobotFileParser(frontend.Parser):  # type: ignore[misc]  # as above
         path = str(getattr(file, "name", file))
         if not cls.may_parse(path):
             endings = " or ".join(f".{extension}" for extension in sorted(EXTENSIONS))
-            raise ValueError(f"{path} is no robot file: its name does not end with {endings}")
+            raise ValueError(f"{path} is not a robot file: its name does not end with {endings}")
         return RobotFile(path), cls()
 
     def parse_description(self, entity: RobotFile) -> LaunchDescription:

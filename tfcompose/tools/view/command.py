@@ -248,11 +248,11 @@ def _free(host: str, port: int) -> int:
     """Return the port; ends with the next free one named where it is taken."""
     if not 0 <= port <= _LAST_PORT:
         fail(
-            f"there is no port {port}: --port takes 0 to {_LAST_PORT}, 0 for any that is free",
+            f"port {port} does not exist: --port takes 0 to {_LAST_PORT}, 0 for any free port",
             UNREADABLE,
         )
     if trouble := _trouble(host, 0):
-        fail(f"--host {host} is no address of this machine: {trouble}", UNREADABLE)
+        fail(f"--host {host} is not an address of this machine: {trouble}", UNREADABLE)
     following = next(
         (other for other in range(port, _LAST_PORT + 1) if not _trouble(host, other)), None
     )

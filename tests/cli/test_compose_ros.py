@@ -153,7 +153,7 @@ def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_kee
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     nothing = tfc("up", "--update")
-    assert (nothing.returncode, "does not run" in nothing.stderr) == (1, True), nothing
+    assert (nothing.returncode, "is not running" in nothing.stderr) == (1, True), nothing
     assert tfc("up", "--wait").returncode == 0
     assert tfc("up", "--update").returncode == 0
     before = ps(tfc)

@@ -300,7 +300,7 @@ def test_edits_that_meet_are_none() -> None:
 def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:
     file = tmp_path / "r.yaml"
     file.write_text("theirs")
-    with pytest.raises(OSError, match="changed meanwhile"):
+    with pytest.raises(OSError, match="changed in the meantime"):
         rewrite(file, "ours", "new")
     assert file.read_text() == "theirs"
 

@@ -29,7 +29,7 @@ def test_a_reader_that_does_not_read_costs_bounded_memory_and_learns_of_it() -> 
     lines = text.decode().splitlines()
     left_out = 20_002 - (len(lines) - 1)
     assert left_out > 10_000
-    assert lines[-2].startswith(f"… {left_out} lines are left out")
+    assert lines[-2].startswith(f"… {left_out} lines were too fast")
     assert "said by the launcher" in lines
     assert lines[-1] == "and on"
 

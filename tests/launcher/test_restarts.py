@@ -309,7 +309,7 @@ def test_a_guard_that_dies_is_restarted_with_its_reports_and_live_edges() -> Non
 
 
 @pytest.mark.parametrize(
-    ("mode", "did"), [("watch", "watched nothing"), ("strict", "passed nothing on")]
+    ("mode", "did"), [("watch", "watched nothing"), ("strict", "forwarded nothing")]
 )
 def test_a_guard_that_hangs_is_reported_and_ended_and_its_end_is_that_of_one_that_dies(
     mode: str, did: str

@@ -212,7 +212,7 @@ def holds_back(robot: Robot, inside: Mapping[str, str], **foreign_inside: str) -
         if importlib.util.find_spec("cyclonedds"):  # there is none for every Python
             program = foreign(OTHER_X, "map odom", "odom extra")
             started.append(robot.start(program, **foreign_inside))
-            robot.says("a DDS program that is no ROS node", after=after)
+            robot.says("a DDS program that is not a ROS node", after=after)
         listener = PlainListener()
         assert OTHER_X not in listener.until("odom", OWNER_X, 40)
         assert "extra" not in listener.heard

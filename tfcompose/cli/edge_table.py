@@ -129,7 +129,7 @@ def chain_line(chain: FrameChain | str, a: str, b: str) -> str:
     parts = [plural(len(chain.newest), "edge")]
     if delay := chain.delay:
         times = f"{duration(delay.mean_s)} on average, {duration(delay.most_s)} at most"
-        parts.append(f"net delay {times}, by {printable(delay.edge.name)}")
+        parts.append(f"net delay {times}; the slowest is {printable(delay.edge.name)}")
     else:
         parts.append("all fixed")
     return f"{ends}: {', '.join(parts)}"

@@ -79,7 +79,15 @@ def _load_module(tool: Tool, module: str) -> Any:
 
         message = f"the tool {tool.name} cannot be loaded: {type(error).__name__}: {error}"
         reject(
-            [finding("TF921", message, None, help=f"repair or uninstall it: {module}")], UNREADABLE
+            [
+                finding(
+                    "TF921",
+                    message,
+                    None,
+                    help=f"update or uninstall the package that provides {module}",
+                )
+            ],
+            UNREADABLE,
         )
 
 

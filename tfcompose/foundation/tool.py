@@ -229,7 +229,11 @@ def installed_tools() -> Toolset:
             names = list(tool.names())
         except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
             message = f"the tool {entry_name} cannot be loaded: {type(error).__name__}: {error}"
-            problems.append(Problem("TF921", message, f"repair or uninstall it: {reference}"))
+            problems.append(
+                Problem(
+                    "TF921", message, f"update or uninstall the package that provides {reference}"
+                )
+            )
             continue
         clashes = [*_clashes(tool, owners), *_wrong_codes(tool)]
         problems += clashes
@@ -254,8 +258,8 @@ def _clashes(tool: Tool, owners: Mapping[tuple[str, str], str]) -> Iterator[Prob
 def _wrong_codes(tool: Tool) -> Iterator[Problem]:
     for code in tool.code_names():
         if not _FOREIGN_CODE.fullmatch(code):
-            message = f"the tool {tool.name} is left out: {code} is not one of its codes"
-            advice = "give its codes a prefix of their own and three digits: ACME101"
+            message = f"the tool {tool.name} is left out: {code} is not a code for a tool"
+            advice = "give its codes their own prefix and three digits: ACME101"
             yield Problem("TF922", message, advice)
 
 

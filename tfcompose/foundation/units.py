@@ -163,7 +163,8 @@ def quantity(text: str, wanted: Dimension | None = None) -> Quantity:
     """
     match = _QUANTITY.fullmatch(text)
     if not match:
-        advice = "write a number, or a number and a unit: 0.3, 30 cm, 15 deg"
+        sample = "30 cm" if wanted is None else example(wanted)
+        advice = f"write a number such as 0.5, or a number and a unit such as {sample}"
         named = _NAMED.fullmatch(text.strip())
         if named and not {text.strip().lower()} & {*UNITS, "inf", "nan"}:
             advice += f'; a variable or an expression is written "${{{named[1] or named[2]}}}"'

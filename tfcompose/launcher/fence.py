@@ -146,7 +146,7 @@ def _profile(plan: Plan, command: ChildCommand, topics: list[str], *, reads: boo
     env = command.env
     moved = [topic for topic in topics if not topic.startswith("/")]
     if moved:
-        message = f"guard: strict needs absolute names of TF topics, not {_all(moved)}, as in"
+        message = f"guard: strict needs absolute names of TF topics, not {_all(moved)}"
         raise _CannotFenceError(message, "write the remapping with a leading slash")
     if not is_fastdds(env):
         message = (

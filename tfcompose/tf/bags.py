@@ -366,11 +366,11 @@ def _files_at(path: Path) -> list[Path]:
             raise BagError(f"{path} {error.findings[0].message}") from None
         files = sorted((file for file in there if file.suffix in ENDINGS), key=_in_order)
         if not files:
-            advice = "ros2 bag record makes a folder with metadata.yaml, which says what is in it"
+            advice = "name the folder that ros2 bag record wrote; it has a metadata.yaml"
             raise BagError(f"{path} has no metadata.yaml and holds no recording", advice)
         return files
     if path.suffix == ".bag":
-        raise BagError(f"{path} is a bag of ROS 1", "rosbags-convert makes one of ROS 2 from it")
+        raise BagError(f"{path} is a bag of ROS 1", "convert it to ROS 2 with rosbags-convert")
     if path.suffix in {".zstd", ".zst"}:
         raise BagError(
             f"{path} is a file that is compressed as a whole",
@@ -378,7 +378,8 @@ def _files_at(path: Path) -> list[Path]:
         )
     if path.suffix not in ENDINGS:
         raise BagError(
-            f"{path} is not a recording: those end in .mcap or .db3", "or name the folder of one"
+            f"{path} is not a recording: those end in .mcap or .db3",
+            "name such a file or its folder",
         )
     return [path]
 

@@ -35,7 +35,7 @@ KINDS = {
     "the guard's name": (node("tfcompose_guard", OTHER_X, "map odom"), "/tfcompose_guard"),
     "an undeclared edge": (node("slam", OTHER_X, "odom extra"), "/slam"),
     "another parent": (node("stranger", OTHER_X, "odom map"), "/stranger"),
-    "another vendor's DDS": (foreign(OTHER_X, "map odom"), "a DDS program that is no ROS node"),
+    "another vendor's DDS": (foreign(OTHER_X, "map odom"), "a DDS program that is not a ROS node"),
 }
 REPORTED_S = 20.0
 
@@ -70,7 +70,7 @@ def _is_named(robot: Robot, kind: str) -> bool:
 
     def is_reported() -> bool:
         return bool(re.search(r"\[TF8\d\d\]", text())) and (
-            "no ROS node" in text() or "runs on this" in text()
+            "not a ROS node" in text() or "runs on this" in text()
         )
 
     until(is_reported, REPORTED_S)

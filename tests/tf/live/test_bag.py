@@ -110,7 +110,7 @@ def test_what_is_no_bag_is_reported_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "cut.mcap").write_bytes(file.read_bytes()[:2000])
     (tmp_path / "noise.mcap").write_bytes(file.read_bytes().replace(b"/tf", b"\xff\xfe\xfd"))
     for name, why in [
-        ("none", "no bag"),
+        ("none", "does not exist"),
         ("noise.mcap", "help: mcap recover"),
         ("empty", "no recording"),
         ("text.mcap", "text.mcap"),
@@ -178,7 +178,7 @@ def test_where_echo_finds_no_pose_in_a_bag_it_says_why(tmp_path: Path) -> None:
         errors = tfcompose("echo", *words, "--bag", bag, code=1).stderr
         assert "error[TF814]" in errors
         assert why in errors
-    assert "there is no bag" in tfcompose("echo", "a", "b", "--bag", "none", code=2).stderr
+    assert "does not exist" in tfcompose("echo", "a", "b", "--bag", "none", code=2).stderr
 
 
 @pytest.mark.parametrize(
@@ -265,7 +265,7 @@ def test_messages_that_cannot_be_read_are_counted(tmp_path: Path) -> None:
         for at in range(3):
             writer.write(connection, at, b"\x00\x01\x00\x00\xff\xff\xff\x7f none")
     output = tfcompose("monitor", "--bag", bag).stdout
-    assert all(number in output for number in ("0 edges", "0 messages", "3 not readable"))
+    assert all(number in output for number in ("0 edges", "0 messages", "3 unreadable"))
 
 
 def test_stamps_of_a_simulation_are_compared_with_the_clock_that_was_recorded(

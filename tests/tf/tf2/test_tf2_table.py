@@ -354,9 +354,9 @@ def test_messages_and_times_are_taken_by_what_they_have() -> None:
         "odom",
     )
     assert (found.transform.translation.x, found.child_frame_id) == (4.5, "laser")
-    with pytest.raises(TypeError, match="is no time"):
+    with pytest.raises(TypeError, match="is not a time"):
         buffer.lookup_transform("odom", "laser", "now")
-    with pytest.raises(TypeError, match="is no time"):
+    with pytest.raises(TypeError, match="is not a time"):
         buffer.lookup_transform("odom", "laser", 1.5)
     with pytest.raises(ValueError, match="cannot be kept"):
         Buffer(-1)

@@ -128,7 +128,7 @@ def test_a_trial_that_nobody_ended_is_reported_and_the_release_of_a_launcher_is_
             )
             shown["MainPID"] = str(launcher.pid)
             assert until(lambda: agent._launched_folder() == plan.parent)  # noqa: B023 (at once)
-        assert agent.follow(made.name, "brain") == "nothing starts again"
+        assert agent.follow(made.name, "brain") == "nothing restarts"
         assert agent.state()["unsettled"]
         agent.commit(made.name)
         agent.settle()

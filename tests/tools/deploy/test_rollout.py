@@ -93,7 +93,7 @@ def test_a_host_that_runs_the_release_goes_on() -> None:
 @pytest.mark.parametrize(
     ("request_", "answer", "says"),
     [
-        ("stop", LostError("is lost: the connection has ended"), "jetson is lost"),
+        ("stop", LostError("lost its connection"), "jetson lost"),
         ("start", RefusedError("systemctl start: no"), "systemctl start: no"),
         ("wait", {"robot": None, "failed": True, "lines": ["error: x"]}, "keeps exiting"),
         (

@@ -108,7 +108,7 @@ def test_a_comment_names_a_node_whose_name_is_another_one_at_each_start() -> Non
     )
     history.observer.take_graph([Publisher(b"s", f"/{node}", static=True)])
     text = drafted(history).text()
-    assert "another name at each start" in text
+    assert "name changes at each start" in text
 
 
 def test_a_command_line_names_its_package() -> None:

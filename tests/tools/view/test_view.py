@@ -282,7 +282,7 @@ def test_a_wrong_robot_is_shown_and_its_mounts_move(
 def test_a_port_that_does_not_exist_is_refused(rover: Path, port: int) -> None:
     done = tfcompose_in(rover.parent, "view", rover.name, f"--port={port}")
     assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].startswith(f"tfcompose: there is no port {port}")
+    assert done.stderr.splitlines()[-1].startswith(f"tfcompose: port {port}")
 
 
 def test_the_camera_begins_outside_the_robot_and_the_grid_is_below_it(
@@ -425,7 +425,7 @@ def test_an_address_that_is_not_this_machines_is_refused(rover: Path) -> None:
     done = tfcompose_in(rover.parent, "view", rover.name, "--host", "192.0.2.1")
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith(
-        "tfcompose: --host 192.0.2.1 is no address of this machine"
+        "tfcompose: --host 192.0.2.1 is not an address of this machine"
     )
 
 

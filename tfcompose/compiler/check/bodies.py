@@ -324,10 +324,10 @@ def body_in_no_urdf(robot: Robot) -> Iterator[Finding]:
         ""
     ]  # TF204 is about other trees
     if first:
-        more = f"; nor {'are' if others[1:] else 'is'} {len(others)} more" if others else ""
-        notes = [Note(f"nor is {name}", outside[name]) for name in others[:_MOST_LISTED]]
+        more = f" (nor {'are' if others[1:] else 'is'} {len(others)} more)" if others else ""
+        notes = [Note(f"{name} is not either", outside[name]) for name in others[:_MOST_LISTED]]
         message = (
-            f"the body of {first} is in no URDF: {first} is not below the base {robot.base}{more}"
+            f"no URDF has the body of {first}: {first} is not below the base {robot.base}{more}"
         )
         advice = (
             f"set base to a frame above both {first} and {robot.base}, or make {first} a part with"

@@ -143,7 +143,7 @@ def rules_of_tools(robot: Robot) -> tuple[list[Rule], list[Finding]]:
             module = vars(load(key.rules)) if key.rules else {}
         except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
             message = f"the rules of {key.name} cannot be loaded: {type(error).__name__}: {error}"
-            advice = f"repair or uninstall it: {key.rules}"
+            advice = f"update or uninstall the package that provides {key.rules}"
             span = robot.sections[key.name].span_of()
             findings.append(finding("TF921", message, span, help=advice))
             continue

@@ -231,7 +231,7 @@ class _Calibrations:
         )
         notes = [Note(f"{entry.name} is defined here", entry.span) for entry in shown[:1]]
         there = (
-            f"there is {', '.join(entry.name for entry in file.entries[:6])}; parent: and child:"
+            f"it has {', '.join(entry.name for entry in file.entries[:6])}; parent: and child:"
             " pick one"
         )
         advice = f"did you mean {near}? {there}" if near else there

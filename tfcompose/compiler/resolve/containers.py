@@ -102,8 +102,8 @@ def _check_component(process: Process, component: Component, draft: Draft) -> It
         message = f"the container of {process.name} is {name}, which is not a container"
         yield finding("TF813", message, spec.span_of((*path, "container")), help=advice)
     if process.ready and process.ready.kind in {"exit", "log"}:
-        what = "end" if process.ready.kind == "exit" else "output"
-        message = f"{process.name} is a component, and has no {what} of its own"
+        lacks = "never exits" if process.ready.kind == "exit" else "has no output"
+        message = f"{process.name} is a component: it {lacks} on its own"
         span = spec.key_span((*path, "ready", process.ready.kind))
         yield finding(
             "TF107", message, span, help="wait for edges, a topic, a service or a lifecycle state"

@@ -61,7 +61,7 @@ def optics_of(
             continue
         frame = sensor.fill_name(pattern)
         if own and own.frame and frame not in frames:
-            advice = did_you_mean(frame, frames, f"there is {', '.join(frames)}")
+            advice = did_you_mean(frame, frames, f"its frames: {', '.join(frames)}")
             span = spec.span_of((*path, "frame"))
             yield finding("TF203", f"{sensor.name} has no frame {frame}", span, help=advice)
             continue

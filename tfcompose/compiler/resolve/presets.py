@@ -147,7 +147,7 @@ def _no_preset(name: str, library: Library, span: Span) -> Finding:
     vendor = name.partition("/")[0]
     same = [name for name in names if name.startswith(f"{vendor}/")]
     there = (
-        f"of {vendor} there is {', '.join(same)}"
+        f"presets of {vendor}: {', '.join(same)}"
         if same
         else f"tfcompose presets lists them; {_OWN}"
     )
@@ -231,7 +231,7 @@ def _refusal(option: PresetOption, key: str, value: Any, span: Span) -> Finding 
         )
     for item in value:
         if item not in option.values:
-            advice = did_you_mean(str(item), option.values, f"there is {known}")
+            advice = did_you_mean(str(item), option.values, f"one of: {known}")
             return finding("TF603", f"the option {key} cannot hold {item!r}", span, help=advice)
     return None
 
@@ -429,7 +429,7 @@ def unknown_node_preset(name: str, span: Span) -> Finding:
         "TF601",
         f"unknown node preset {name}",
         span,
-        help=did_you_mean(name.rpartition("/")[2], names, f"there is {', '.join(names)}"),
+        help=did_you_mean(name.rpartition("/")[2], names, f"its frames: {', '.join(names)}"),
     )
 
 

@@ -217,7 +217,7 @@ def check_waits(draft: Draft) -> Iterator[Finding]:
                 continue  # it was not written here
             elif other not in known | refused and not other.startswith(missing):
                 names = sorted(known - {process.name})
-                advice = did_you_mean(other, names, f"there is {', '.join(names)}")
+                advice = did_you_mean(other, names, f"one of: {', '.join(names)}")
                 message = f"{process.name} waits for {other}, which is not a process"
                 yield finding("TF813", message, spec.key_span((*path, other)), help=advice)
 
@@ -447,17 +447,17 @@ def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Itera
         or (way == "simulate" and path[0] == "sensors")
     ):
         return  # no driver is simulated: that is refused
-    what, whom = "simulated", "the real process"
+    what, whom = "simulated", "on the real process"
     if way == "external":
-        what, whom = "external", "whoever starts the process"
+        what, whom = "external", "where the process is started"
     elif way == "component":
-        what, whom = "a component", f"the container {process.container}"
+        what, whom = "a component", f"on the container {process.container}"
     for key in (
         process.model_fields_set - keys_of(way) - RUNNING - {"rate"}
     ):  # which are refused elsewhere
         message, advice = (
             f"{name} is {what}, so {key} has no effect",
-            f"remove it: it is for {whom}",
+            f"remove it, or set it {whom}",
         )
         yield finding("TF851", message, spec.key_span((*path, key)), help=advice)
 
@@ -646,7 +646,7 @@ def _wrong_positions(
                 advice = did_you_mean(
                     name,
                     movable,
-                    f"there is {', '.join(movable)}" if movable else "no joint moves",
+                    f"moving joints: {', '.join(movable)}" if movable else "no joint moves",
                 )
                 yield finding("TF703", f"no moving joint {name}", span, help=advice)
         elif joint and what == SWEEP and _sweep(joint) is None:

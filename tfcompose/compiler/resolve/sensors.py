@@ -232,16 +232,16 @@ class _Mounting:
         for name, own in sensor.spec.frames.items():
             span = spec.key_span((*path, name))
             if name not in known:
-                advice = did_you_mean(name, known, f"there is {', '.join(known)}")
+                advice = did_you_mean(name, known, f"its frames: {', '.join(known)}")
                 yield finding("TF203", f"{sensor.name} has no frame {name}", span, help=advice)
             elif own.parent and own.parent not in known:
-                advice = did_you_mean(own.parent, known, f"there is {', '.join(known)}")
+                advice = did_you_mean(own.parent, known, f"its frames: {', '.join(known)}")
                 message = f"{sensor.name} has no frame {own.parent}"
                 yield finding("TF203", message, spec.span_of((*path, name, "parent")), help=advice)
         mounted = sensor.spec.frames.get(original)
         if mounted and (mounted.xyz or mounted.parent or mounted.joint or rotation_of(mounted)):
-            advice = f"its pose and joint are those of {sensor.name}"
-            message = f"{mount} is the mount, and has no pose inside"
+            advice = f"set its pose and joint at {sensor.name} itself"
+            message = f"{mount} is the mount and has no pose inside the sensor"
             yield finding("TF106", message, spec.key_span((*path, original)), help=advice)
         if mount in sensor.frames():
             message = f"{mount} is a frame inside {sensor.name} already"

@@ -35,7 +35,7 @@ def settings_text(settings: Mapping[str, str]) -> str:
 def elsewhere_help(elsewhere: Sequence[str]) -> str:
     """Return the help for missing TF, depending on TF on other topics."""
     if elsewhere:
-        return f"there is TF on {list_names(elsewhere)}: {namespace_options(elsewhere)}"
+        return f"TF is on {list_names(elsewhere)}: {namespace_options(elsewhere)}"
     return "is the robot running, and with these settings? tfcompose doctor looks for the reason"
 
 
@@ -48,14 +48,14 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
     message = f"no node publishes {moving} or {fixed}; in {state.seconds:.1f} s {others} "
     message += "was found" if len(state.nodes) < 2 else "were found"  # noqa: PLR2004 (one, or none)
     notes = [Note(f"seen: {list_names(state.nodes)}")] if state.nodes else []
-    notes.append(Note(f"looked with {settings_text(state.settings)}"))
+    notes.append(Note(f"settings: {settings_text(state.settings)}"))
     if state.plan:
         notes.append(
             Note(f"{plural(len(state.plan.edges), 'edge')} of {state.plan.robot} should be there")
         )
     elsewhere = _elsewhere(state)
     if elsewhere:
-        notes.append(Note(f"there is TF on {list_names(elsewhere)}"))
+        notes.append(Note(f"TF is on {list_names(elsewhere)}"))
         advice = f"look there: tfcompose doctor {namespace_options(elsewhere)}"
     elif state.plan and not state.nodes:
         advice = (

@@ -53,7 +53,7 @@ def share_of(plan: Plan, host: str | None, machine: str) -> Plan | Finding:
     watched = next((process.host for process in plan.processes if process.kind == "guard"), None)
     if plan.guard.mode == "strict" and watched is not None:
         message = (
-            f"guard: strict passes on by each machine's guard, and that of {plan.robot} is on"
+            f"guard: strict needs a guard on each machine, and that of {plan.robot} is on"
             f" {watched} only"
         )
         return finding(

@@ -81,8 +81,8 @@ _WHERE = {
 #: What an expression takes for something else.
 RESERVED = {
     "pi": "a number already",
-    "params_file": "for the arguments of a process",
-    "build_dir": "for the arguments of a process",
+    "params_file": "reserved for the arguments of a process",
+    "build_dir": "reserved for the arguments of a process",
     **dict.fromkeys(("and", "or", "not", "if", "else", "true", "false"), "a word of conditions"),
 }
 #: What may be meant by a path that only a process knows.
@@ -461,7 +461,7 @@ class _Evaluation:
         if name not in _FUNCTIONS:
             known = ", ".join(_FUNCTIONS)
             raise ExpressionError(
-                f"unknown function {name}", did_you_mean(name, _FUNCTIONS, f"there is {known}")
+                f"unknown function {name}", did_you_mean(name, _FUNCTIONS, f"functions: {known}")
             )
         argument = self.number(node)
         accepted, compute, gives = _FUNCTIONS[name]

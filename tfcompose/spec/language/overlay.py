@@ -312,7 +312,7 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
         wanted = getattr(ros, name)
         if name in own and own[name] != wanted:
             message = (
-                f"{name} of the part {path[-1]} is {own[name]}, and of the robot that holds it"
+                f"the part {path[-1]} has {name} {own[name]}, but the robot that includes it has"
                 f" {wanted}"
             )
             notes = [Note("set here", part.span_of(("ros", name)))]
@@ -411,7 +411,7 @@ def _wrong_profiles(source: Source) -> list[Finding]:
 
 def _unknown_profile(source: Source, name: str, read: Reader | None) -> Finding:
     known = list(source.mapping("profiles"))
-    there = f"there is {', '.join(known)}" if known else "the file has no profiles"
+    there = f"profiles: {', '.join(known)}" if known else "the file has no profiles"
     advice = did_you_mean(name, known, there)
     if parts := _parts_with_profile(source, name, read) if read else []:
         entries = list_names((f"{part}: {{profiles: [{name}]}}" for part in parts), 3)

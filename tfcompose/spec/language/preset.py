@@ -271,7 +271,7 @@ def _frames(preset: PresetSpec) -> Iterator[SpecRefusal]:
     known = [preset.mount, *preset.frames]
     for path, name in _named_frames(preset):
         if name not in known:
-            advice = did_you_mean(name, known, f"there is {', '.join(known)}")
+            advice = did_you_mean(name, known, f"its frames: {', '.join(known)}")
             yield SpecRefusal("TF606", path, f"{preset.model} has no frame {name}", advice)
     for name in known:
         for hole in _HOLE.findall(name):
@@ -279,11 +279,11 @@ def _frames(preset: PresetSpec) -> Iterator[SpecRefusal]:
                 yield SpecRefusal(
                     "TF606",
                     ("words",),
-                    f"{name}: no word {hole}",
-                    "there is {name}, and what words has",
+                    f"{name}: unknown placeholder {hole}",
+                    "write {name}, or a placeholder that words defines",
                 )
     if preset.mount in preset.frames:
-        message = f"{preset.mount} is the mount; where it is, the robot says"
+        message = f"{preset.mount} is the mount: the robot file sets its pose"
         yield SpecRefusal("TF606", ("frames", preset.mount), message, on_key=True)
     for name in preset.frames:
         above, steps = name, 0

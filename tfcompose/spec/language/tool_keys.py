@@ -99,5 +99,11 @@ def _types(tools: Toolset) -> tuple[dict[str, Any], list[Problem]]:
         except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
             types[name] = Any
             message = f"the model of {name} cannot be loaded: {type(error).__name__}: {error}"
-            problems.append(Problem("TF921", message, f"repair or uninstall it: {section.model}"))
+            problems.append(
+                Problem(
+                    "TF921",
+                    message,
+                    f"update or uninstall the package that provides {section.model}",
+                )
+            )
     return types, problems

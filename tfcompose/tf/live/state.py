@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: How a publisher is called whose node has no name.
 NAMELESS = "a publisher without a node name"
 #: Who publishes with DDS and without ROS.
-NO_NODE = "a DDS program that is no ROS node"
+NO_NODE = "a DDS program that is not a ROS node"
 
 
 @dataclass(frozen=True, slots=True)

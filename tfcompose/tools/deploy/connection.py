@@ -119,7 +119,7 @@ class ConnectedHost:
             except (OSError, asyncssh.Error, ValueError) as error:
                 raise LostError(f"lost its connection: {error}") from None
         if answer is None:
-            raise LostError("closed the connection")
+            raise LostError("lost its connection")
         if "error" in answer:
             raise RefusedError(answer["error"])
         return answer["answer"]

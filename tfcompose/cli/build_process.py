@@ -67,13 +67,13 @@ class BuildProcess:
 
         Raises:
             SystemExit: with the exit code of a failed build, which has printed the reason.
-            OSError: if one ended the build.
+            OSError: the one that ended the build.
         """
         with open(self._pipe, "rb", closefd=False) as pipe:
             answer = pipe.read()
         code = self._exit_code()
         if code < 0:
-            fail(f"the build was ended by {signal.Signals(-code).name}")
+            fail(f"the build was killed by {signal.Signals(-code).name}")
         if code == 0:
             file, _, found = answer.partition(b"\0")
             return Path(os.fsdecode(file)), msgspec.json.decode(found, type=list[Finding])

@@ -127,7 +127,7 @@ def code_addresses(stream: TextIO) -> CodeAddress:
     The pages are at ``$TFCOMPOSE_DOCS``, a URL or a folder, or at the project's own address.
     Files, pipes, NO_COLOR and pages missing from a folder get no links.
     """
-    docs = os.environ.get("TFCOMPOSE_DOCS") or DOCUMENTATION_URL
+    docs = _documentation()
     if not docs or os.environ.get("NO_COLOR") or not can_redraw(stream):
         return no_address
     from pathlib import Path
@@ -136,14 +136,27 @@ def code_addresses(stream: TextIO) -> CodeAddress:
     from tfcompose.foundation.reading import exists
 
     if _URL.match(docs):
-        base = quote(docs.rstrip("/"), safe=_URL_SAFE)
-        return lambda code: f"{base}/{code_page(code)}"
+        return code_url
     folder = Path(docs).expanduser().absolute()
     base = f"file://{os.uname().nodename}{quote(os.fsencode(folder))}"
     return lambda code: f"{base}/{code_page(code)}" if exists(folder / code_page(code)) else ""
 
 
-#: The begin of a URL, and the characters that it may have as they are (RFC 3986).
+def code_url(code: str) -> str:
+    """Return the URL of a code's page; empty if the pages are in a folder, or unpublished."""
+    from urllib.parse import quote
+
+    docs = _documentation()
+    if not _URL.match(docs):
+        return ""
+    return f"{quote(docs.rstrip('/'), safe=_URL_SAFE)}/{code_page(code)}"
+
+
+def _documentation() -> str:
+    return os.environ.get("TFCOMPOSE_DOCS") or DOCUMENTATION_URL
+
+
+#: The beginning of a URL, and the characters that need no escape in it (RFC 3986).
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")
 _URL_SAFE = ":/?#[]@!$&'()*+,;=%~"
 

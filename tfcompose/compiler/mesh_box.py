@@ -202,7 +202,7 @@ def _by_rotation(values: list[float], point: Vector) -> Vector:
     return rotate(quat_from_axis_angle((x, y, z), math.radians(degrees)), point)
 
 
-#: What moves the contents of a node, by the tag.
+#: Transformations of a node's contents, by tag.
 _MOVES: dict[str, Callable[[list[float], Vector], Vector]] = {
     "matrix": _by_matrix,
     "translate": _by_translation,

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge
     from tfcompose.spec.load import Path, Source
 
-#: What says where an edge is, and who sends it.
+#: Keys that set where an edge is, and who sends it.
 _KEYS = (
     *(
         "parent",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 #: it must have been.
 FIRST_S = 15.0
 FIRST_BY_NS = 500_000_000
-#: How long messages are waited for whose count tells when a publisher began.
+#: Maximum wait for messages whose sequence number tells when a publisher began, in seconds.
 COUNTING_S = 0.7
 
 

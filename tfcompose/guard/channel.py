@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from tfcompose.guard.judge import Judge
     from tfcompose.guard.relay import Relay
 
-#: What a guard reports that is switched off: it looks, and judges nobody.
+#: Events of a guard with mode off: it observes but does not judge.
 _OBSERVATIONS = (
     Alive,
     Clear,
@@ -65,9 +65,9 @@ _OBSERVATIONS = (
     ComponentState,
     DescriptionState,
 )
-#: How often the launcher hears that the guard looks, in seconds.
+#: Period of the guard's sign of life to the launcher, in seconds.
 ALIVE_EVERY_S = 1.0
-#: How often the launcher hears what is wrong now, in seconds, and how many findings at most.
+#: Period at which the launcher gets the current findings, in seconds, and their maximum number.
 FINDINGS_EVERY_S = 0.5
 MOST_FINDINGS = 100
 #: A longer part of the memory is not handed on: the launcher takes no longer lines; characters.

@@ -28,15 +28,14 @@ if TYPE_CHECKING:
     from tfcompose.tf.process import Own
     from tfcompose.tf.ros.composition import Container
 
-#: A container that is to unload something, and does not answer for so long, is left alone;
-#: seconds.
+#: A container that does not answer an unload request within this time is left alone; seconds.
 ANSWER_S = 5.0
 #: An answer that is not there by then may be lost: what the container has says it, too; seconds.
 LIST_AFTER_S = 2.0
 #: More often than this a component is not missing by chance: it was unloaded, or the request to
 #: load it was lost.
 ABSENT_AT_MOST = 1
-#: How often the guard looks whether a container has its components; seconds.
+#: Period at which the guard checks that a container has its components, in seconds.
 CHECK_EVERY_S = 2.0
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from tfcompose.model.messages import DescriptionOrder, GuardEvent
 
-#: How long a node may take, in seconds.
+#: Maximum time for a node's answer, in seconds.
 ANSWER_S = 5.0
 _NAME = "robot_description"
 #: The description in a parameter file that tfcompose wrote.

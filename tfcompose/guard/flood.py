@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.topics import TFData
     from tfcompose.tf.ros.tf_codec import SentTransform
 
-#: At one time it reads for so long, in seconds, and as long as it has to read, the guard waits no
-#: longer than that.
+#: Maximum time of one read, in seconds; while a flood remains to be read, the guard waits at most
+#: the second time.
 SLICE_S, WAIT_S = 0.001, 0.01
 _TOGETHER = 50
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.parameters import ParameterReader, Value
 
 
-#: How often a gate is looked at, in seconds.
+#: Period between two checks of a gate, in seconds.
 CHECK_EVERY_S = 0.2
 #: And at a node that is in its state.
 ASK_AGAIN_S = 2.0
@@ -167,9 +167,10 @@ def _lifecycle(node: Node, name: str, state: str, *, drive: bool) -> Lifecycle:
     return Lifecycle(node, name, state, drive=drive)
 
 
-#: How often nodes are looked for, in seconds.
+#: Period between two searches for nodes, in seconds.
 _CHECK_SWITCHES_EVERY_S = 0.5
-#: For so long a parameter that the node does not have is asked for again, so often.
+#: Time during which a parameter that the node lacks is requested again, and the period of these
+#: requests, in seconds.
 DECLARED_WITHIN_S = 20.0
 AGAIN_EVERY_S = 2.0
 

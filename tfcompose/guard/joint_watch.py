@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import GuardEvent
     from tfcompose.model.plan import Plan
 
-#: How often the topics are read, in seconds.
+#: Period between two reads of the topics, in seconds.
 READ_EVERY_S = 0.5
-#: Who sends nothing for so long is a sender no more.
+#: A node that sends nothing for this time is no longer a sender.
 SENDS_NO_MORE_NS = 3_000_000_000
 
 

@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan, PlanEdge
     from tfcompose.tf.live.publishers import Message, Senders
 
-#: How long a publisher that may be the owner can stay without a name before it is judged.
+#: Time that a possible owner may stay without a name before it is judged.
 NAMELESS_OWNER_S = 5.0
 #: The most kinds of messages whose verdicts are kept, and the most edges of these together.
 MOST_VERDICTS = 4096
 MOST_VERDICT_EDGES = 200_000
-#: How long the verdict on a message with undeclared edges holds.
+#: Validity of the verdict on a message with undeclared edges.
 UNDECLARED_S = 1.0
 #: The most undeclared edges of one publisher that are judged; further ones are neither reported
 #: nor admitted.
@@ -50,7 +50,7 @@ MOST_UNDECLARED = 1000
 #: one that stays.
 OVER_S = 3.0
 OVER_WHILE_PRESENT_S = 30.0
-#: How long a strict guard waits until it knows whether listeners get it.
+#: Time a strict guard waits to learn whether listeners receive a message.
 FATE_S = 0.3
 #: All that another robot publishes is one finding.
 OTHER_ROBOT = "TF854"
@@ -59,7 +59,7 @@ OTHER_ROBOT = "TF854"
 _TAKES = frozenset({faults.NOT_OWNER, faults.WRONG_PARENT, faults.LOOP})
 #: Faults that break the tree: ``stop-offender`` stops the process.
 _STOPPED_FOR = _TAKES | {faults.UNDECLARED}
-#: What becomes of a message in a strict plan, by whether it is sent behind the fence.
+#: Note on a message in a strict plan, by whether its sender is behind the fence.
 _FATE = {
     True: "held back: no listener receives it",
     False: "not fenced off, so it cannot be held back: listeners receive it",

@@ -33,19 +33,19 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import Plan, PlanEdge
 
-#: A rate is judged over this time, or so many periods; half of it at least. Arrivals are counted
-#: in stretches of this part of it, of which the last two count.
+#: A rate is judged over this time or this many periods, and at least half of it. Arrivals are
+#: counted in intervals of this fraction of it, and the last two intervals count.
 WINDOW_S = 2.0
 WINDOW_PERIODS = 8.0
 STRETCH = 0.6
-#: For so many combinations of edges their tracks are remembered.
+#: Maximum number of edge combinations whose tracks are remembered.
 MOST_MESSAGES = 1000
-#: So many edges one event names: a line of it is shorter than what a pipe's reader takes.
+#: Maximum number of edges in one event, so that its line is shorter than a pipe's reader accepts.
 MOST_NAMED = 1000
-#: Of the time between two ticks only so much counts; the guard ticks ten times a second.
+#: Maximum time that one tick counts; the guard ticks ten times a second.
 MAX_TICK_S = 0.25
-#: After so long without a tick messages are lost. What is lost comes when the writer's next
-#: heartbeat does: 3 s in Fast DDS.
+#: After this time without a tick, messages are lost. Lost messages arrive with the writer's next
+#: heartbeat: 3 s in Fast DDS.
 STALLED_S = 1.0
 CATCH_UP_S = 3.5
 

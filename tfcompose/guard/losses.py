@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import GuardEvent
 
 CHECK_EVERY_S = 0.1
-#: It is over when nothing was lost for so long.
+#: The finding is over when no message was lost for this time.
 OVER_S = 10.0
 
 

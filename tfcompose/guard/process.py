@@ -80,13 +80,13 @@ if TYPE_CHECKING:
 
 
 CHECK_EVERY_S = 0.1
-#: A check waits so much longer while messages come that are passed on, in seconds.
+#: Extra delay of a check while messages arrive that must be forwarded, in seconds.
 LATE_S = 0.05
 #: A guard that passes nothing on lets messages gather this long between two steps, in seconds: a
 #: wake-up costs more than a message. After a step that took this many it does not, since readers
 #: keep a thousand.
 GATHER_S, GATHER_BELOW = 0.05, 100
-#: How often a strict guard says what it held back, in seconds.
+#: Period at which a strict guard reports what it held back, in seconds.
 REPORT_EVERY_S = 10.0
 
 

@@ -35,12 +35,12 @@ _LATCHED = "latched:"
 #: The most messages that are kept for listeners that have not received them yet. tf2's depth of
 #: 100 is that of one publisher; all publishers of the robot may send at the same moment.
 KEPT = 500
-#: Of so many senders' edges what was held back is counted.
+#: Maximum number of senders whose held-back edges are counted.
 MOST_COUNTED = 1000
 NAMED_AT_MOST = 6
-#: So many messages with fixed edges wait for their senders' names.
+#: Maximum number of messages with fixed edges that wait for their senders' names.
 MOST_WAITING = 200
-#: So many publishers are named from which nothing is passed on.
+#: Maximum number of refused publishers that are reported by name.
 MOST_REFUSED = 100
 
 

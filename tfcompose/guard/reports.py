@@ -26,19 +26,18 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.publishers import Publisher, Senders
 
 Key = TypeVar("Key")
-#: How long further reports of one kind are collected after one; longer while more come and come:
-#: a tracker that names frames after what it tracks has new ones each second.
+#: Time for which further reports of one kind are collected after the first; longer while more
+#: arrive: a tracker that names frames after objects has new ones each second.
 COLLECTED_S = 0.5
 COLLECTED_AT_MOST_S = 60.0
 #: The most publishers, and kinds of reports, that are remembered as reported.
 MOST_REPORTED = 2000
-#: How long a flood is counted before it is reported, in seconds.
+#: Time for which a flood is counted before it is reported, in seconds.
 FLOOD_COUNTED_S = 1.0
-#: So long after it was first heard, an owner's latched message is surely all that is left of those
-#: before, in seconds.
+#: After this time, an owner's latched message has surely replaced its earlier ones, in seconds.
 ALL_HEARD_S = 2.0
-#: How long messages of a publisher past the fence are waited for, so that they are reported before
-#: it is stopped.
+#: Time to wait for messages of a publisher that bypasses the fence, so that they are reported
+#: before it is stopped.
 UNFENCED_SILENT_S = 0.5
 _UNFENCED = "TF852"
 

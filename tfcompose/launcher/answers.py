@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
 
 
-#: A larger plan is not read.
+#: Maximum size of a plan, in bytes.
 MOST_PLAN_BYTES = 64_000_000
 
 Answer = RobotStatus | Done | PlanChange | Refusal
-#: The answer, what it means for the machine, and another plan's file and commands.
+#: The answer, the event for the machine, and a new plan's file and commands.
 Outcome = tuple[Answer, "Event | None", "tuple[Path, dict[str, ChildCommand]] | None"]
 
 
@@ -175,18 +175,18 @@ def _plain_file(file: Path) -> bytes:
     return data
 
 
-# What is different in another plan.
+# Differences of another plan.
 
 
 @dataclass(frozen=True, slots=True)
 class PlanDifference:
-    """The difference between two plans, as far as a run has to follow it."""
+    """The differences between two plans that affect a run."""
 
     #: Processes that must restart.
     changed: frozenset[str]
     #: Fixed edges that vanished. Listeners keep them until they restart.
     held: tuple[str, ...]
-    #: Processes that differ only in the robot description, a parameter they can take while they
+    #: Processes that differ only in the robot description, a parameter that they accept while they
     #: run.
     described: frozenset[str] = frozenset()
 
@@ -209,7 +209,7 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDiff
     return PlanDifference(frozenset(changed), _vanished_edges(old, new), frozenset(redescribed))
 
 
-#: The line of a parameter file that the stock robot_state_publisher has its description in.
+#: The line with the description in a parameter file of the stock robot_state_publisher.
 _DESCRIPTION = re.compile(rb'^ +"robot_description": "[^\n]*"$', re.MULTILINE)
 
 

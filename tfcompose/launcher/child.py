@@ -34,24 +34,22 @@ if TYPE_CHECKING:
 
 #: A line longer than this comes in pieces; bytes.
 LINE_LIMIT = 64 * 1024
-#: What is read at once, so that a process that floods leaves time for the others; bytes.
+#: Maximum size of one read, so that a process that floods leaves time for the others; bytes.
 READ_SIZE = 64 * 1024
-#: What a process may write: so much at once, and so much a second; more is read, counted and
-#: thrown away; bytes.
+#: Output limits of a process: at once, and per second. More is read and counted, but dropped;
+#: bytes.
 BURST = 8_000_000
 PER_SECOND = 1_000_000
 #: The end of what is thrown away is kept, and comes when there is time again: a process's last
 #: words count; bytes.
 TAIL = 4096
-#: What is read from a process that has ended, at most: more than a pipe holds, less than for ever;
-#: bytes.
+#: Maximum output read from a process that has ended: more than a pipe holds, but bounded; bytes.
 DRAIN_LIMIT = 1024 * 1024
 
 #: The size of a pseudo-terminal: lines and columns.
 TERMINAL_SIZE = (40, 120)
 
-#: How much of its log goes into the finding for a process that failed: lines, and characters of
-#: each.
+#: Size of the log excerpt in the finding for a failed process: lines, and characters per line.
 LAST_LINES = 8
 LAST_LINE_LENGTH = 300
 

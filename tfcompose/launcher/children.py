@@ -57,9 +57,9 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import GuardOrder, Notice, Stream
     from tfcompose.model.plan import PlanProcess
 
-#: So much of a line is compared with what a gate waits for, in characters.
+#: Maximum length of a line's beginning that is compared with a gate's pattern, in characters.
 LONGEST_MATCHED = 4000
-#: The launcher waits so long for one comparison, in seconds.
+#: Time limit of one comparison in the launcher, in seconds.
 MATCHED_WITHIN_S = 0.1
 #: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
 EVENT_LIMIT = 1024 * 1024
@@ -401,7 +401,7 @@ class GuardPipes:
         os.close(self._orders)
 
 
-#: What the reaper runs: it reads groups until the launcher is gone.
+#: Script of the reaper: it reads process groups until the launcher is gone.
 _SCRIPT = """
 groups='' last=''
 while read -r line; do groups=$line; last=$line; done

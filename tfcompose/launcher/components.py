@@ -85,7 +85,7 @@ def order_components(step: Transition) -> None:
             step.actions.append(Order(ComponentOrder(name, tracked.order, "unload")))
 
 
-#: What may be a logger's name: ROS writes it in brackets, in a line's beginning.
+#: Logger names: ROS writes them in brackets at the beginning of a line.
 _LOGGER = re.compile(r"\[([\w.]+)\]")
 _BEGINNING = 300
 

@@ -32,9 +32,9 @@ A = TypeVar("A")
 #: A longer request is refused; a listener that is so far behind is let go; bytes.
 LONGEST_REQUEST = 64 * 1024
 LONGEST_BACKLOG = 1024 * 1024
-#: So many lines are kept for those who come later.
+#: Number of lines kept for clients that connect later.
 KEPT_LINES = 500
-#: How long the launcher may take to answer, in seconds.
+#: Maximum time for the launcher's answer, in seconds.
 ANSWER_S = 20.0
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import PlanEdge
 
 
-#: How many of an owner's edges a finding names.
+#: Maximum number of an owner's edges in a finding.
 NAMED_AT_MOST = 12
 
 

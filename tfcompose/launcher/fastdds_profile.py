@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-#: What a writer's or reader's profile is called, the second by older releases.
+#: Element names of writers' and readers' profiles; the second name is that of older releases.
 WRITERS, READERS = ("data_writer", "publisher"), ("data_reader", "subscriber")
 Kind = Literal["data_writer", "data_reader"]
 

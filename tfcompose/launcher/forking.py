@@ -48,7 +48,7 @@ _LTTNG = re.compile(r"/liblttng-ust(-[0-9a-f]{8})?\.so")
 _SIGSET_SIZE = 128
 #: mallopt(3): a thread's own part of memory starts empty, and DDS has ten threads.
 _M_ARENA_MAX, _ARENAS = -8, 2
-#: Where the command line and the environment are that /proc shows; not given back.
+#: Mappings of the command line and the environment that /proc shows; never released.
 _shown: list[mmap.mmap] = []
 
 

@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import Notice, ProcessMessage, Request
 
 
-#: So much is kept for a slow reader; what the launcher itself says may take as much again; bytes.
+#: Buffer for a slow reader; the launcher's own messages may use as much again; bytes.
 KEPT = 256 * 1024
-#: What a pipe or terminal surely takes when it is ready; bytes.
+#: Size that a ready pipe or terminal accepts at once; bytes.
 PIECE = 4096
 
 
@@ -265,12 +265,12 @@ class Notifier:
             self._lost()
 
 
-#: A file is turned over beyond this size; so many old ones are kept beside it.
+#: Size at which a log file is rotated, and the number of old files kept; bytes.
 FILE_BYTES = 8_000_000
 KEPT_FILES = 2
-#: Of so many runs it is known when they began.
+#: Number of runs whose start times are kept.
 KEPT_RUNS = 100
-#: After a failure the disk is left alone for so long, in seconds.
+#: Pause before the disk is tried again after a failure, in seconds.
 LEFT_ALONE_S = 5.0
 
 

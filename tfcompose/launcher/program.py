@@ -25,14 +25,14 @@ PROCESSES = {
     "exec": "tfcompose.launcher.exec",
     "rehearse": "tfcompose.launcher.rehearse",
 }
-#: What several of them import once they handle signals.
+#: Modules that more than one of the programs imports once it handles signals.
 SHARED_MODULES = (
     "tfcompose.guard.process",
     "tfcompose.launcher.publishers.description",
     "tfcompose.launcher.publishers.simulate",
     "tfcompose.launcher.publishers.static",
 )
-#: What starts the program on this machine, with the installation that runs now.
+#: Command that starts the program on this machine with the current installation.
 HERE = (sys.executable, str(Path(__file__).absolute().parents[1] / "__main__.py"))
 #: The code that starts the program where only a Python that has tfcompose is known: it looks for
 #: it in the current folder last.

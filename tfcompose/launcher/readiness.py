@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Gates that the guard watches.
 _GUARDED = ("edges", "topic", "service", "lifecycle")
-#: So many edges are named of those that are missing.
+#: Maximum number of missing edges that are named.
 _NAMED_AT_MOST = 4
 
 

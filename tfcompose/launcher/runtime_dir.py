@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
     from tfcompose.model.plan import Plan
 
-#: Where systemd makes a folder for each user who is logged in, also for services and cron, which
-#: lack the variable.
+#: systemd makes a folder here for each logged-in user. Services and cron lack the variable, but
+#: not the folder.
 USERS = Path("/run/user")
-#: What logind knows of users who are logged in, and of those whose folder stays after they leave.
+#: Folders of logind: of logged-in users, and of users whose folder stays after a logout.
 LOGGED_IN, LINGERING = Path("/run/systemd/users"), Path("/var/lib/systemd/linger")
-#: How the folder of a plan's copy begins.
+#: Prefix of the folder with a plan's copy.
 _PLAN = "plan-"
 
 

@@ -77,7 +77,7 @@ if TYPE_CHECKING:
 LONGEST_SLEEP_S = 1.0
 #: It checks this often whether the run's files are there; seconds.
 FILES_CHECK_S = 0.5
-#: What ends a plan.
+#: Signals that end a plan.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 #: Processes that can be held before they publish.

@@ -38,7 +38,7 @@ CLOCK = "rosgraph_msgs/msg/Clock"
 _CLOCK, _CLOCK_BYTES = Struct("<iI"), 12
 _SECOND_NS = 1_000_000_000
 ENDINGS = {".mcap", ".db3"}
-#: So many topics are named where those asked for are not there.
+#: Maximum number of topics named if the requested ones are missing.
 _NAMED_AT_MOST = 12
 
 

@@ -13,6 +13,7 @@ from urllib.parse import unquote, urlparse
 import pytest
 from jsonschema import Draft4Validator, ValidationError
 
+from tests.support.cli import tfcompose_in
 from tfcompose import __version__
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
@@ -86,6 +87,18 @@ def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> N
         assert rule["fullDescription"]["text"] == rule["help"]["text"] == page
         assert " ".join(page.split()).startswith(rule["shortDescription"]["text"])
         assert "\n" not in rule["shortDescription"]["text"]
+
+
+def test_each_rule_links_to_its_page_if_the_pages_have_a_url(tmp_path: Path) -> None:
+    (tmp_path / "r.yaml").write_text("tfcompose: 1\nrobot: r\n", encoding="utf-8")
+    command = ("lint", "r.yaml", "--format", "sarif")
+    linked = tfcompose_in(tmp_path, *command, TFCOMPOSE_DOCS="https://example.org/my docs/")
+    log = json.loads(linked.stdout)
+    VALIDATOR.validate(log)
+    (rule,) = log["runs"][0]["tool"]["driver"]["rules"]
+    assert rule["helpUri"] == f"https://example.org/my%20docs/codes/{rule['id']}.html"
+    in_folder = tfcompose_in(tmp_path, *command, TFCOMPOSE_DOCS="docs")
+    assert "helpUri" not in in_folder.stdout
 
 
 @pytest.mark.parametrize(

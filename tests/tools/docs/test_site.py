@@ -97,6 +97,15 @@ def test_every_link_leads_to_a_file_and_an_anchor_of_the_site(
     assert not broken
 
 
+def test_pages_of_codes_follow_each_other_in_the_order_of_the_codes(site: Path) -> None:
+    codes, order = sorted(CATALOGUE), sorted(CATALOGUE)[:1]
+    while found := re.search(
+        r'codes/(\w+)\.html"><small>Next', (site / f"codes/{order[-1]}.html").read_text("utf-8")
+    ):
+        order.append(found[1])
+    assert order == codes
+
+
 def test_an_anchor_is_there_once_a_page(pages: dict[Path, Parsed]) -> None:
     for file, page in pages.items():
         assert sorted(set(page.anchors)) == sorted(page.anchors), file

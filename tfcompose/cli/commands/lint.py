@@ -20,6 +20,7 @@ from tfcompose.cli.terminal import (
     MOST_OF_ONE_CODE,
     UNREADABLE,
     can_redraw,
+    code_url,
     exit_code_of,
     fail,
     has_reader,
@@ -315,4 +316,4 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
     else:
         from tfcompose.compiler.render.formats import render_sarif
 
-        sys.stdout.write(render_sarif(findings, __version__))
+        sys.stdout.write(render_sarif(findings, __version__, code_url))

@@ -121,7 +121,7 @@ def _principal(
 
 #: A mesh that is no longer marks a frame, and is not its body.
 _MARK_M = 1e-3
-#: Of what its shapes give, and of what boxes around its meshes would.
+#: Allowed ratio to the inertia of its shapes, and to that of boxes around its meshes.
 _TIMES, _TIMES_OF_BOX = 10, 100
 
 
@@ -189,7 +189,7 @@ def density_of_no_material(robot: Robot) -> Iterator[Finding]:
             yield finding("TF732", message, inertial.mass_at or link.span, help=advice)
 
 
-#: Of air at sea level, in kg/m³.
+#: Density of air at sea level, in kg/m³.
 _AIR = 1.2
 #: A smaller body has a mass only because a simulator asks for one; of a larger one the sizes are
 #: not in metres (TF414).

@@ -308,7 +308,7 @@ def negative_damping(robot: Robot) -> Iterator[Finding]:
                 yield finding("TF731", message, joint.span, help="give 0 or more, or remove it")
 
 
-#: What a joint does about its axis, of those that do not turn.
+#: Verbs for the axis of joints that do not turn.
 _ABOUT = {"prismatic": "moves along", "planar": "lies across"}
 
 

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 _GOOD = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
-#: What URDF and TF take, and a person can type.
+#: Names that URDF and TF accept, and a person can type.
 _TAKEN = r"[\w.:+@-]+(/[\w.:+@-]+)*"
-#: What no listener can look up, or no XML file can hold.
+#: Names that no listener can look up, or no XML file can hold.
 _LOST = r"(?s)|/.*|\s.*|.*\s|.*[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff].*"
 _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
 _LAUNCHER = "tfcompose"

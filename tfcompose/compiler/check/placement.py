@@ -65,7 +65,7 @@ class _Views:
         )
 
 
-#: Of the robot that was asked for last: several rules need them, one after the other.
+#: Views of the most recent robot, which several rules need one after the other.
 _LAST: list[_Views] = []
 
 
@@ -310,7 +310,7 @@ def _is_light(optics: Optics) -> bool:
     return optics.kind in {"camera", "lidar"}
 
 
-#: How high the window of a scanner is, that another one's plane has to meet.
+#: Height of a scanner's window, which another scanner's plane has to meet.
 _WINDOW_M = 0.03
 
 
@@ -380,7 +380,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
             )
 
 
-#: How many points a zone is sampled with along x, y and z.
+#: Number of sample points in a zone along x, y and z.
 _GRID = (10, 10, 4)
 
 

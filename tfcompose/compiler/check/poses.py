@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Link, MountedSensor, Robot
 
 
-#: Degrees that people write. Read as radians, all but 5 are more than a full turn, which nobody
-#: means.
+#: Degrees that people write. Read as radians, all but 5 exceed a full turn, which is never
+#: intended.
 _ROUND_DEG = frozenset(
     {
         5.0,
@@ -47,8 +47,8 @@ _ROUND_DEG = frozenset(
 )
 #: As limits, -5 to 5 and -10 to 10 are radians: two or three turns, or none that is known.
 _ROUND_LIMITS_DEG = _ROUND_DEG - {5.0, 10.0}
-#: No joint with limits turns farther than the first, but a reel, whose limits are not whole; more
-#: than the second says that there is none.
+#: No joint with limits turns farther than the first value, except a reel, whose limits are not
+#: round. Limits beyond the second mean that there are none.
 _FARTHEST_RAD, _MOST_LIMIT_DEG = 20.0, 720.0
 #: No joint with limits turns faster.
 _FASTEST_RAD_S = 45.0
@@ -193,7 +193,7 @@ _VIEWS = {
     "rear": (_X, -1, 0.8),
     "back": (_X, -1, 0.8),
 }
-#: Where a camera looks, by the axis and its sign.
+#: View directions of a camera by axis and sign.
 _DIRECTIONS = {
     (_X, 1): "front",
     (_X, -1): "rear",
@@ -359,8 +359,8 @@ def _sizes(link: Link) -> list[float]:
     return [max(size) for shape in shapes if (size := size_of(shape))]
 
 
-#: A mesh so much longer than the robot's longest edge is not in metres; a small robot may still
-#: have a mesh of this length.
+#: A mesh longer than the robot's longest edge by this factor is not in metres; a small robot may
+#: still have a mesh of the second length.
 _MESH_TIMES, _LARGE_MESH_M = 20, 5.0
 #: Nothing to go by but the mesh: a hall or a field may be this long.
 _LONE_MESH_M = 50.0
@@ -408,7 +408,8 @@ Box = tuple[list[float], list[float]]
 #: Kinds of sensors that take images.
 CAMERAS = frozenset({"camera", "mono", "stereo", "rgbd", "tof"})
 
-#: How far from the bodies something still counts as on the robot, in metres: the arm of a mount.
+#: Distance from the bodies within which a point counts as on the robot, in metres: the arm of a
+#: mount.
 _REACH_M = 0.2
 
 #: Words in names of two sides, and the axis (0: x, 1: y) on which these differ; the first of each
@@ -432,7 +433,7 @@ _SIDE_WORDS = {token for pair in _SIDES for token in pair[:2]}
 _NEAR_M = 1e-6
 #: Nearer to the middle than this, left and right may well be at one place.
 _MIDDLE_M = 0.01
-#: So near to the other one's mirror image, the two are a pair.
+#: Two frames are a pair if each is this close to the other's mirror image.
 _MIRRORED_M = 0.001
 
 

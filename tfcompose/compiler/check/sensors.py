@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Calibration, Edge, MountedSensor, Process, Robot
 
 
-#: How much closer to the nominal pose the inverse must be, and within how many times the limit.
+#: Required ratio of the inverse's distance from the nominal pose, and its maximum as a multiple of
+#: the limit.
 _NEARER, _NEAR = 0.9, 3.0
 
 
@@ -202,7 +203,7 @@ def calibration_copied(robot: Robot) -> Iterator[Finding]:
             yield finding("TF618", message, measured.named_at, help=advice, notes=notes)
 
 
-#: What is built into other devices, and so may share their pose.
+#: Kinds that are built into other devices and may share their pose.
 _BUILT_IN_KINDS = frozenset({"imu", "gnss"})
 _SAME_M, _SAME_RAD = 1e-6, 1e-6
 #: A parent that is turned by more has other sides than the base.
@@ -364,7 +365,7 @@ def serial_used_twice(robot: Robot) -> Iterator[Finding]:
     yield from _addresses_used_twice(robot, found)
 
 
-#: How parameters are called that say where a device is.
+#: Names of parameters that locate a device.
 _ADDRESSES = re.compile(
     r"(?:.*_)?(?:port|ip|ip_addr|ip_address|host|hostname|device|device_id|device_path"
     r"|serial_no|serial_number|video_device|usb_port_id|mxid|guid)"

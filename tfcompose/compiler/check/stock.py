@@ -25,8 +25,8 @@ _STATIC_PUBLISHER, _STATE_PUBLISHER = "static_transform_publisher", "robot_state
 _CHILD = re.compile(r"<child\s+link\s*=\s*[\"']([^\"']+)[\"']")
 #: The sections whose entries can name an owner.
 _WITH_OWNERS = frozenset({"frames", "links", "joints", "sensors", "parts"})
-#: How many words the forms without options have: a position, angles or a quaternion, and the two
-#: frames.
+#: Number of arguments of the forms without options: a position, angles or a quaternion, and the
+#: two frames.
 _WITH_ANGLES, _WITH_QUATERNION = 8, 9
 
 

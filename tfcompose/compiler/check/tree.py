@@ -78,8 +78,8 @@ def cycle(robot: Robot) -> Iterator[Finding]:
                 )
 
 
-#: For so many names the nearest one is looked for: among thousands that takes long, and thousands
-#: are no typos.
+#: Maximum number of names for which the nearest one is searched: among thousands this takes long,
+#: and thousands are not typos.
 _MOST_SEARCHES = 50
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Link, MountedSensor, Robot, Shape
 
 _WHEEL = re.compile(r"wheel|tyre|(?<![a-z])tire")
-#: What turns about an upright axis, and may carry a wheel that lies across it.
+#: Names of bodies that turn about an upright axis and may carry a wheel across it.
 _SWIVEL = re.compile(r"caster|castor|swivel|steer|pivot|fork")
 #: The cosine of 10 degrees: axes nearer to each other are parallel.
 _PARALLEL = math.cos(math.radians(10))

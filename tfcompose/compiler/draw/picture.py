@@ -35,7 +35,7 @@ MIN_WIDTH = 440.0
 LEGEND_LINE = 22.0
 ITEM_GAP = 20.0
 SAMPLE_WIDTH = 34.0
-#: What each kind of line means, in the order of the legend.
+#: Meaning of each kind of line, in the order of the legend.
 LINES = {
     "static": "fixed",
     "joint": "moved by joint states",

@@ -35,7 +35,7 @@ PAPER = ("ffffff", "14181d")
 INK = ("1b1f24", "e8ebee")
 SOFT = ("57606a", "a3adb8")
 
-#: Of each colour, in light and dark mode: the line, the box, and text on the line's colour.
+#: Colours of the line, the box, and text on the line, each in light and dark mode.
 _OWNERS = (
     (
         ("66707c", "8d98a5"),

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import MountedSensor, Optics
 
-#: How many rays a stream is sampled with, at most: columns and rows of a grid; of a lidar, steps
-#: of a turn and rows.
+#: Maximum number of rays for a stream: columns and rows of a grid; for a lidar, steps of a turn
+#: and rows.
 _IMAGE = (24, 16)
 _CIRCLE, _ROWS = 360, 9
 _COARSE_CIRCLE = 90
 _DISC = 300
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
-#: How far from the plane of a scanner, in radians, is still in it.
+#: Angle from the plane of a scanner that still counts as in it, in radians.
 _FLAT_RAD = 1e-6
 
 

@@ -7,12 +7,14 @@ import re
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from tfcompose.compiler.render.text import no_address
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.text import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from tfcompose.compiler.render.text import CodeAddress
     from tfcompose.foundation.findings import Finding, Span
 
 
@@ -81,15 +83,20 @@ def _escape_property(text: str) -> str:
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def render_sarif(findings: Sequence[Finding], version: str) -> str:
-    """Return the findings as one SARIF run, with the page of each code."""
+def render_sarif(
+    findings: Sequence[Finding], version: str, address_of: CodeAddress = no_address
+) -> str:
+    """Return the findings as one SARIF run, with the page of each code.
+
+    ``address_of`` returns the URL of a code's page, or an empty text.
+    """
     codes = sorted({finding.code for finding in findings})
     run = {
         "tool": {
             "driver": {
                 "name": "tfcompose",
                 "version": version,
-                "rules": [_rule(code) for code in codes],
+                "rules": [_rule(code, address_of(code)) for code in codes],
             }
         },
         "columnKind": "unicodeCodePoints",
@@ -103,16 +110,15 @@ def render_sarif(findings: Sequence[Finding], version: str) -> str:
     )
 
 
-def _rule(code: str) -> dict[str, Any]:
+def _rule(code: str, address: str) -> dict[str, Any]:
     page = CATALOGUE.page(code)
     return {
         "id": code,
         "name": CATALOGUE[code].name,
         "shortDescription": {"text": CATALOGUE.summary(code)},
         "fullDescription": {"text": page},
-        # no helpUri: the pages are at no address of the web
         "help": {"text": page, "markdown": page},
-    }
+    } | ({"helpUri": address} if address else {})
 
 
 def _result(finding: Finding, index: int) -> dict[str, Any]:

@@ -138,7 +138,7 @@ def add_joint_name(draft: Draft, name: str | None, path: Path) -> Finds[Span | N
 
 
 _MOVING = "revolute, continuous or prismatic"
-#: What is said of a joint's motion, by types of joints of which it says nothing.
+#: Descriptions of motion for types of joints that describe none.
 _IDLE = {
     "fixed": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),
     "floating": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),

@@ -136,7 +136,7 @@ def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
     return OF_FILES.sub(absolute, value) if isinstance(value, str) else value
 
 
-#: What macros call the link that they bolt themselves to, and the block with their pose in it.
+#: Macros' names for the link that they attach to, and for the block with their pose.
 _PARENTS, _ORIGIN = ("parent_link", "parent", "parent_frame", "connected_to"), "origin"
 
 

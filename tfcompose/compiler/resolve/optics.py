@@ -24,7 +24,7 @@ _KEYS = tuple(
     for field in fields(Optics)
     if field.name in OpticsSpec.model_fields and field.name not in {"frame", "kind"}
 )
-#: What the streams of a sensor are unless they say it.
+#: Default kinds of a sensor's streams.
 _KINDS: dict[str, OpticsKind] = {
     "camera": "camera",
     "stereo": "camera",
@@ -34,8 +34,8 @@ _KINDS: dict[str, OpticsKind] = {
     "radar": "radar",
     "ultrasonic": "ultrasonic",
 }
-#: What replaces another key of the same stream: whichever the user gives, the preset's other one
-#: says nothing then.
+#: Keys that replace another key of the same stream: if the user sets one, the preset's other key
+#: is ignored.
 _REPLACES = {"elevations": ("channels", "vertical"), "channels": ("elevations",)}
 
 

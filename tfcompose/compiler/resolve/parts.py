@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Resolve = Callable[..., tuple[Draft, list[Finding]]]
 
 
-#: How many parts a robot may have, those of its parts counted.
+#: Maximum number of parts of a robot, including parts of parts.
 MOST_PARTS = 100
 
 

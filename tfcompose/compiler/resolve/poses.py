@@ -73,8 +73,7 @@ def solve_poses(draft: Draft) -> Iterator[Finding]:
     yield from solver.findings
 
 
-#: How deep a chain of poses that are given relative to each other is followed before it is solved
-#: from its far end.
+#: Depth to which a chain of relative poses is followed before it is solved from its far end.
 _DEEPEST = 50
 
 

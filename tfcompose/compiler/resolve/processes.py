@@ -120,7 +120,7 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
     return None
 
 
-#: How often a simulated owner publishes an edge that declares no rate.
+#: Rate of a simulated owner's edge that declares none.
 _USUAL_RATE_HZ = 20.0
 
 

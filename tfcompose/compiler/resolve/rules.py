@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve.draft import Finds
     from tfcompose.spec.language.robot import RobotSpec
 
-#: What a limit can be, by its unit in the catalogue: its dimension, what that is called, and one
-#: way to write it.
+#: Kinds of limits by their unit in the catalogue: dimension, name, and an example.
 _KINDS = {
     "m": (LENGTH, "a length", "5 cm"),
     "rad": (ANGLE, "an angle", "45 deg"),

@@ -265,7 +265,7 @@ def _has_driven_frames(sensor: Sensor) -> bool:
     return any(frame.driver for frame in sensor.preset.frames.values())
 
 
-#: What a driver's further processes have in common with its first.
+#: Keys that a driver's further processes inherit from its first.
 _INHERITED = frozenset({"host", *(row.name for row in PROCESS_KEYS if row.is_shared)})
 #: In an argument, the file that holds the parameters of a process.
 PARAMS_FILE = "${params_file}"

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 #: Elements that name links or joints of the robot.
 REFERRING = frozenset({"gazebo", "transmission", "ros2_control"})
-#: What a block may hold, besides extensions with a prefix of their own.
+#: Elements allowed in a block, besides extensions with their own prefix.
 _ALLOWED = ("transmission", "gazebo", "ros2_control", "sensor", "material")
-#: What belongs into a section of the robot file, and what into another element.
+#: Elements that belong in a section of the robot file, and those that belong in another element.
 _SECTIONS = {"link": "links", "joint": "joints", "robot": "include"}
 _INNER = frozenset(
     {"visual", "collision", "inertial", "origin", "geometry", "limit", "mimic", "axis", "plugin"}
@@ -195,7 +195,7 @@ def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
 
 # ros2_control.
 
-#: What ros2_control reads as attributes of an interface, and not as parameters.
+#: Attributes that ros2_control reads from an interface, rather than parameters.
 ATTRIBUTES = ("data_type", "size")
 _TYPES = ("system", "actuator", "sensor")
 _KINDS = ("joint", "sensor", "gpio")

@@ -32,16 +32,17 @@ if TYPE_CHECKING:
 
 #: The module that runs xacro, confined.
 PROCESS = "tfcompose.compiler.urdf.xacro_process"
-#: How a file declares an argument, and how it asks for one.
+#: Patterns with which a file declares an argument, and uses one.
 _ARGUMENT = re.compile(
     r"""<xacro:arg\b[^>]{0,4000}?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)"""
 )
-#: What xacro's messages name, and what stands before and after that in a file.
+#: Names in xacro's messages, and the text around them in a file.
 _NAMED = (
     (re.compile(r"when evaluating expression '(.+)'"), r"\$\{\s*", r"\s*\}"),
     (re.compile(r"unknown macro name: (xacro:\S+)"), "<", r"(?=[\s/>])"),
 )
-#: So many words of an expression are searched for: each begin in a file is tried with all.
+#: Maximum number of words of an expression that are searched for: each possible start in a file is
+#: tried with all of them.
 _MOST_WORDS = 20
 _WORD = re.compile(r"""["']?(\w+)["']?""")
 #: The largest number of macros around an error that are named.
@@ -63,7 +64,7 @@ _ALONE = (
 
 
 _PLACE = ([int], None)
-#: What the process answers.
+#: Shape of the process's answer.
 _MADE = {"text": str, "files": [str], "places": [_PLACE], "comments": [[int]]}
 _MARK = ([(str, int)], None)
 _STOPPED = {

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Tensor = tuple[float, float, float, float, float, float]
 
 _UNMOVED = Pose()
-#: What computing leaves of a product of inertia that is 0, as a part of the trace.
+#: Rounding error of a product of inertia that is 0, relative to the trace.
 _NOISE = 1e-15
 
 

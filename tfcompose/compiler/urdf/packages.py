@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
-#: What others write for a file in a package: xacro and launch files, and those who forget a slash.
+#: Forms that others use for a file in a package: xacro and launch files, and addresses with a
+#: missing slash.
 _MEANT = re.compile(
     r"(?:(?:file://)?\$\(find(?:-pkg-share)?\s+([\w.-]+)\s*\)|package:/?([\w.-]+))/+(.+)"
 )

@@ -61,7 +61,7 @@ ELEMENTS: dict[str, tuple[str, str]] = {
 #: The components of a tensor, in the order in which ``Inertial`` holds them.
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
-#: Of each primitive shape the attributes that give its size, each with how many numbers it has.
+#: Size attributes of each primitive shape, each with its number of values.
 SIZES: dict[str, tuple[tuple[str, int], ...]] = {
     "box": (("size", 3),),
     "cylinder": (("radius", 1), ("length", 1)),

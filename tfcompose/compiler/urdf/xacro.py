@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
 
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
-#: How a file defines a macro, up to its name, and the macro's parameters in that tag.
+#: Definition of a macro in a file, up to its name, and the macro's parameters in that tag.
 _MACRO = re.compile(r"""<xacro:macro\s[^>]{0,4000}?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
 #: Characters of a tag.
 _LONGEST = 100_000

@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 
 #: Processor time for one expression, in seconds.
 MOST_EXPRESSION_S = 5.0
-#: So long before the process is ended it ends by itself, and says what it was busy with.
+#: The process ends itself this long before it would be ended, and reports what it was doing.
 _SPARE_S = 1.0
-#: Of the text that is made.
+#: Maximum size of the resulting text.
 MOST_BYTES = 16_000_000
 #: Elements that are made on the way; most of what a macro holds can be left out again.
 MOST_ELEMENTS = 1_000_000

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 
 KEPT_S = KEPT_NS / 1e9
-#: Stamps that are older on arrival make lookups of "now", and of new data, fail for so long;
-#: costmaps wait 0.3 s.
+#: Stamps that are older on arrival make lookups at the current time, and of new data, fail for
+#: this time; costmaps wait 0.3 s.
 LATE_S = 0.3
-#: Who waits for a transform rarely waits longer.
+#: Listeners rarely wait longer than this for a transform.
 LACK_S = 0.3
 #: A clock, or a driver, that is ahead by more.
 AHEAD_S = 0.05

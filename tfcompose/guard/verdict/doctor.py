@@ -121,7 +121,7 @@ def examine(states: Sequence[TreeState]) -> Diagnosis:
     )
 
 
-#: Who sends so many edges one by one could send fewer messages.
+#: From this many edges on, a node that sends each in its own message could send fewer messages.
 _SINGLE_FROM = 3
 
 

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
     Value = bool | int | float | str
 
-#: How far a frame may be from its value: a nominal one, and one that is exact.
+#: Tolerances of a frame's pose: of a nominal value, and of an exact one.
 NOMINAL, EXACT = Offset(0.02, radians(5.0)), Offset(0.001, radians(0.2))
 #: A quaternion's length may be so far from 1.
 UNIT_WITHIN = 0.005
-#: So many frames of publishers without a name are kept at most.
+#: Maximum number of frames kept from publishers without a name.
 _MOST = 1000
 
 

@@ -34,7 +34,7 @@ _WARNINGS = frozenset({SELF, TWO_PUBLISHERS, stamps.REPEATED, stamps.BACK})
 #: A driver that sends frames otherwise than its preset has them.
 _OTHERWISE = frozenset({WRONG_PARENT, UNDECLARED})
 LISTED_AT_MOST = 12
-#: So many edges have a line each when they are over; more are reported in one.
+#: Up to this many recovered edges get a line each; more share one line.
 OVER_IN_LINES = 3
 #: The most publishers of one name that have a note each.
 RUNS_AT_MOST = 50

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 #: A listener keeps the last 100 messages on /tf_static, one of each publisher.
 MOST_STATIC = 100
 LISTED_AT_MOST = 12
-#: What two poses may be apart and count as the same.
+#: Two poses closer than this count as the same.
 SAME_POSE = Offset(1e-3, math.radians(0.1))
 #: A micrometre, a millidegree.
 _SAME = Offset(1e-6, 2e-5)
-#: One that sends so long after the other began has not only replaced it.
+#: If both publishers send for longer than this, the second has not simply replaced the first.
 TOGETHER_S = 0.3
 
 

@@ -27,11 +27,11 @@ LEAST = {("odom", "base_link"): 20.0, ("odom", "base_footprint"): 20.0, ("map", 
 LEAST_INSIDE = 5.0
 #: A timer of 20 Hz sends a little less than 20 Hz.
 NEARLY = 0.9
-#: So many messages say how often something comes.
+#: Minimum number of messages to judge a rate.
 FEWEST = 3
-#: A gap that is longer by this factor than the others, and than so many seconds.
+#: A gap counts if it exceeds the others by this factor, and this many seconds.
 GAP, GAP_S = 10.0, 1.0
-#: Of a low rate one is sure after so long.
+#: A low rate is certain after this time.
 SURE_S = 1.0
 NAMED_AT_MOST = 6
 

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 LOCALHOST_ONLY, SERVER = "ROS_LOCALHOST_ONLY", "ROS_DISCOVERY_SERVER"
 #: The variables that decide who hears whom.
 VARIABLES = (DOMAIN, RANGE, LOCALHOST_ONLY, RMW, "ROS_STATIC_PEERS", SERVER)
-#: What decides who hears whom, with what holds where it is not set.
+#: Variables that decide which nodes discover each other, with their default values.
 DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: "", SERVER: ""}
-#: Of processes with other settings, those of so many settings are named, so many of each.
+#: Maximum number of differing settings in a finding, and of processes for each.
 MOST_SETTINGS = MOST_PROCESSES = 3
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-#: What nodes publish of a simulator, and where that is switched off, by patterns of the nodes'
-#: names. None of them has a parameter for it. ros_gz_bridge passes on what its ``config_file`` or
-#: its arguments name. Isaac Sim's node has the name of a prim of an action graph, with ``_`` for
-#: each ``/``; its name by default is that of its type.
+#: TF output of simulators' nodes and how to switch it off, by patterns of the nodes' names. None
+#: of them has a parameter for it. ros_gz_bridge forwards the topics in its ``config_file`` or its
+#: arguments. Isaac Sim's node has the name of a prim of an action graph, with ``_`` for each
+#: ``/``; its default name is that of its type.
 _TREES = {
     "ros_gz_bridge": "passes on the tree of Gazebo: take /tf out of its config_file or its"
     " arguments, or give that another ROS topic there",

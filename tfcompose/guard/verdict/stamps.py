@@ -28,7 +28,7 @@ _SECOND_NS = 1_000_000_000
 #: Before 2001: no time of day.
 _NO_DATE_NS = 10**9 * _SECOND_NS
 KEPT_S = KEPT_NS / _SECOND_NS
-#: A single step back by so much is enough.
+#: A single step back of this size is enough for a finding.
 LARGE_STEP_S = 1.0
 #: Stamps that are ahead by more make lookups of "now" give a pose of before; nodes that predict do
 #: so by less.
@@ -38,22 +38,23 @@ AHEAD_S = 0.15
 LOCALISED_IN, FORWARD_S = ("map", "earth", "world"), 1.1
 #: A simulated clock takes smaller steps.
 CLOCK_STEP_S = 0.5
-#: A message that seems to arrive so long before it was sent comes from a clock that is ahead.
+#: A message that seems to arrive this much before it was sent comes from a clock that is ahead.
 SKEW_S = 0.02
 #: A network is not that slow; a clock may be that late.
 SLOW_S = 0.25
-#: At the end: so many stamps, and this part of all, are no accident.
+#: Judged at the end: this many wrong stamps, and this fraction of all, are no accident.
 FEWEST, PART = 5, 0.3
-#: Message by message: so many wrong ones in a row are no accident; so many that are right end it.
+#: Judged message by message: this many wrong stamps in a row are no accident, and this many right
+#: ones end the fault.
 WRONG_IN_A_ROW = 3
-#: Each fault counts up by so many, each right message down by one; at so many the fault is
-#: reported.
+#: Each fault raises the count by the first number, and each right message lowers it by one; the
+#: fault is reported at the second.
 REPEAT_COUNTS, REPEATS = 2, 10
 STEP_COUNTS, BACK_STEPS = 4, 12
-#: How fast simulated time goes by is measured over so long.
+#: The speed of simulated time is measured over this time.
 SPEED_OVER_S = 2.0
-#: Simulated time that has not moved for so long stands: the simulator is paused. Less than an edge
-#: may be quiet.
+#: Simulated time that has not advanced for this time is paused. Shorter than the silence allowed
+#: for an edge.
 STANDS_S = 0.3
 
 
@@ -96,8 +97,8 @@ def _off(stamp_ns: int, reference_ns: int) -> str:
     )
 
 
-#: How far the time scales of receivers and PTP are ahead of UTC since 2017, in seconds (IERS
-#: Bulletin C; GPS is TAI - 19 s).
+#: Offsets from UTC of the time scales of receivers and PTP since 2017, in seconds (IERS Bulletin
+#: C; GPS is TAI - 19 s).
 _SCALES = {37.0: "TAI, which PTP has", 18.0: "the time of GPS"}
 #: A clock that is that near to such an offset has it, in seconds.
 _NEAR_S, _NEAR_HOUR_S = 0.5, 20.0

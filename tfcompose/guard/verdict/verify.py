@@ -55,11 +55,11 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
     Group = Sequence["Difference"]
 
-#: A rate is judged from so many messages on.
+#: Minimum number of messages to judge a rate.
 FEWEST = 4
-#: How long a publisher may stay without a name before it is judged all the same.
+#: Time that a publisher may stay without a name before it is judged anyway.
 NAMELESS_S = 0.7
-#: Of poses that are off so many are listed.
+#: Maximum number of wrong poses that are listed.
 MOST_POSES = 6
 _TURNING = frozenset({"revolute", "continuous"})
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tfcompose.tf.process import Own
 
 TOPIC = "robot_description"
-#: How often a process checks while something is awaited, in seconds.
+#: Period of a process's checks while it waits for something, in seconds.
 CHECK_EVERY_S = 0.5
 _MOST_NAMED = 16
 _NAMED_WITHIN_S = 3.0

@@ -33,7 +33,8 @@ _SECOND_NS = 1_000_000_000
 # Joint states come with one list of names from each driver; one that never repeats itself must not
 # fill the memory.
 _MOST_SOURCES = 64
-# Faults are reported once by their sentence, which may hold a name; at most so many.
+# Maximum number of faults that are reported; each sentence, which may hold a name, is reported
+# once.
 _MOST_LINES = 64
 
 

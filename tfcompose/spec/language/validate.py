@@ -1,4 +1,4 @@
-"""From a source to a typed spec, with everything that is wrong found in one pass."""
+"""Validation of a source into a typed spec, which finds all errors in one pass."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Validated:
     """A spec without refused entries, and the findings about these."""
 
     spec: RobotSpec
-    #: The source with the entries that conditions and loops leave.
+    #: The source after conditions and loops were applied.
     source: Source
     findings: tuple[Finding, ...]
     #: The paths of refused values.
@@ -48,30 +48,30 @@ class Validated:
     args: dict[str, ParameterValue] = field(default_factory=dict)
     #: The values of the environment variables that the file names.
     environment: dict[str, str] = field(default_factory=dict)
-    #: Conditions of the entries that were left out, by (section, name).
+    #: Conditions of the entries that they left out, by (section, name).
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
-    #: Entries with refused values, by (section, name). What is missing because of them is not
-    #: reported a second time.
+    #: Entries with refused values, by (section, name). Errors that follow from them are not
+    #: reported.
     broken: frozenset[tuple[str, str]] = frozenset()
     #: The plain data of the source with arguments and environment: the input of a plan's digest.
     source_data: dict[str, Any] = field(default_factory=dict)
 
 
-#: Sections whose entries bring names of frames.
+#: Sections whose entries define names of frames.
 _BRINGS_FRAMES = frozenset({"frames", "joints", "links", "parts", "sensors"})
 
 
 def _entry(path: Path) -> tuple[str, str]:
-    """Return the entry that a refused path is in; without a name where it is a whole section.
+    """Return the (section, name) of a refused path; the name is empty for a whole section.
 
-    Of a section that may have brought any frame, that of a part without a prefix.
+    If the section may have defined any frame, return that of a part without a prefix.
     """
     section, name = (*map(str, path[:2]), "")[:2]
     return ("parts" if not name and section in _BRINGS_FRAMES else section), name
 
 
 def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield the links, as entries, that have no parent only because their joints were refused."""
+    """Yield the entries of links that lack a parent because their joint was refused."""
     for section, name in broken:
         joint = joints.get(name) if section == "joints" else None
         child = joint.get("child") if isinstance(joint, dict) else None
@@ -80,12 +80,12 @@ def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[
 
 
 def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Validated:
-    """Return the typed spec of a file that is ``given`` these arguments.
+    """Return the typed spec of a file with the ``given`` arguments.
 
-    ``aside`` is data that is not merged over it now, and may use its variables too.
+    ``aside`` is data that is not merged now, such as other profiles, but may use its variables.
 
     Raises:
-        RejectedError: if so much is missing that no robot is left (its name, or the version).
+        RejectedError: if the robot's name or the version is missing.
     """
     variables = Variables(source, given)
     idle = unused_variables(source.data, aside)
@@ -129,9 +129,9 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
 
 
 def _with_ros_arguments(spec: RobotSpec, arguments: RosArguments) -> RobotSpec:
-    """Return the robot in the namespace around it, with the clock that it is given.
+    """Return the robot with the namespace and the clock of the ROS arguments.
 
-    Frames keep the names of the robot file, also if those come from its own namespace.
+    Frames keep the names of the robot file, even those with the file's own namespace.
     """
     if arguments == RosArguments():
         return spec
@@ -149,7 +149,7 @@ def _with_ros_arguments(spec: RobotSpec, arguments: RosArguments) -> RobotSpec:
     return spec.model_copy(update={"ros": ros})
 
 
-#: How topics are isolated where frames are not to be.
+#: Isolation of topics for each isolation, without frames.
 _WITHOUT_FRAMES: dict[Isolation, Isolation] = {"frames": "none", "both": "topics"}
 
 
@@ -165,9 +165,9 @@ def validate_preset(source: Source) -> PresetSpec:
 def validate_file(
     kind: type[M], source: Source, check: Callable[[M], Iterable[SpecRefusal]] = lambda _: ()
 ) -> M:
-    """Return the typed file of a language that needs nothing but its model.
+    """Return the typed file of a language that needs only its model.
 
-    ``check`` yields what is wrong with a file whose keys and values are right.
+    ``check`` yields further faults of a file whose keys and values are valid.
 
     Raises:
         RejectedError: with every finding, if anything is wrong with it.
@@ -186,8 +186,8 @@ def validate_file(
 def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[str, str]]:
     """Yield each entry of ``rules`` with its severity, empty for that of the code.
 
-    Off is that of a code whose entry was refused, or whose limit is not among ``limits``, by code:
-    the default would not be what is meant.
+    A code is off if its entry was refused, or if its limit is not in ``limits``, because the
+    default would be wrong.
     """
     for section, level in sorted(validated.broken):
         if section == "rules" and (code := code_of(level)) and can_be_allowed(code):
@@ -203,7 +203,7 @@ def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[s
 def _nulls(source: Source) -> list[SpecRefusal]:
     """Return a refusal of each key and item without a value.
 
-    Null only removes what it is merged over.
+    Null is only valid in an overlay, where it removes a value.
     """
     found: list[SpecRefusal] = []
 
@@ -229,16 +229,16 @@ def _nulls(source: Source) -> list[SpecRefusal]:
     return found
 
 
-#: A key and its value in one word, which the name of a frame with a colon, such as tag36h11:7, is
-#: not.
+#: A key and its value without a space, unlike the name of a frame with a colon, such as
+#: tag36h11:7.
 _WITHOUT_SPACE = re.compile(r"([a-z_]+):(\S+)")
-#: What is left of a quantity such as 1,5 kg behind its comma.
+#: The part after the comma of a quantity such as 1,5 kg.
 _AFTER_A_COMMA = re.compile(r"\d+(\s*[a-zA-Z°/^0-9]+)?")
 
 
 def _findings(refusals: Iterable[SpecRefusal], source: Source) -> list[Finding]:
     """Return the findings, each once.
 
-    What stands in an anchor is refused wherever an alias names it.
+    A fault in an anchor would otherwise be reported again at each alias.
     """
     return list(dict.fromkeys(refusal.finding(source) for refusal in refusals))

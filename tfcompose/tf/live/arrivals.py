@@ -10,8 +10,8 @@ from math import sqrt
 
 #: tf2's buffers keep 10 s: a stamp that is farther off cannot be looked up together with the rest.
 KEPT_NS = 10_000_000_000
-#: A gap that is longer than the window, and than this many usual ones, is a pause: rates begin
-#: anew after it.
+#: A gap longer than the window and than this many usual gaps is a pause: rates are measured from
+#: its end.
 PAUSE = 10.0
 
 

@@ -11,13 +11,12 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.node import Received
     from tfcompose.tf.ros.tf_codec import Decoder, Row
 
-#: So many edges of one publisher are kept, or as many as its first message has; no robot's
+#: Maximum number of edges kept of one publisher, unless its first message has more. No robot's
 #: publisher sends more.
 MOST_OF_ONE = 10_000
-#: So many edges are kept, counting an edge once for each publisher.
+#: Maximum number of edges kept, counting an edge once for each publisher.
 MOST_EDGES = 20_000
-#: Reading messages with ever new edges takes so much of each second at most, in seconds, whoever
-#: sends them.
+#: Time per second for reading messages with ever new edges of all senders, in seconds.
 BUSY_S = 0.1
 
 

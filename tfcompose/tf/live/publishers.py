@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.tf_codec import MessageLayout
 
 Key = TypeVar("Key")
-#: So many layouts of publishers are remembered whose poses were read.
+#: Number of publishers' message layouts that are remembered.
 _MOST = 1024
 
 
@@ -89,18 +89,17 @@ class MessageReader:
         )
 
 
-#: Of publishers that have left so many are remembered: those that come and go take a bounded
+#: Number of publishers that have left and are remembered: those that come and go use a bounded
 #: memory.
 MOST_LEFT = 1000
-#: So many bytes of an id are its participant's (RTPS: a GUID's prefix).
+#: Number of bytes of an id that are its participant's (RTPS: a GUID's prefix).
 PARTICIPANT = 12
-#: How many gaps between messages tell surely when a publisher began; so many at least, when time
-#: is short.
+#: Number of gaps between messages that tell for certain when a publisher began, and the minimum if
+#: time is short.
 GAPS, FEWEST_GAPS = 5, 2
-#: A gap that was seen may be shorter than usual by this factor.
+#: An observed gap may be shorter than usual by this factor.
 UNSURE = 3.0
-#: How long a publisher may stay without a name, or out of the graph, before it is judged all the
-#: same.
+#: Time that a publisher may stay without a name, or out of the graph, before it is judged anyway.
 NAMELESS_S = 0.7
 UNCOUNTED = 2**64 - 1
 
@@ -161,7 +160,7 @@ class Publisher:
 
 
 def forget_oldest(known: dict[Key, Any], present: Collection[Key]) -> None:
-    """Forget the oldest of absent publishers beyond ``MOST_LEFT``."""
+    """Forget the oldest absent publishers beyond ``MOST_LEFT``."""
     left = (
         [key for key in known if key not in present]
         if len(known) > len(present) + MOST_LEFT
@@ -180,11 +179,11 @@ class Publishers:
 
     def __init__(self, *, says_who: bool = True) -> None:
         self.says_who = says_who
-        #: Whether the graph was asked: of a recording nobody can.
+        #: Whether the graph is known; a recording has none.
         self.queried = False
-        #: Those that are there, by id.
+        #: Present publishers by id.
         self.present: dict[bytes, Publisher] = {}
-        #: All by id, as they were when they had a name last.
+        #: All publishers by id, as they were when they last had a name.
         self.known: dict[bytes, Publisher] = {}
 
     def update(self, publishers: Sequence[Publisher]) -> None:
@@ -251,7 +250,7 @@ class Publishers:
 
 @dataclass(slots=True)
 class MessageCounter:
-    """One publisher: its first arrival, and the rate of its sequence numbers."""
+    """A publisher's first arrival, and the rate of its sequence numbers."""
 
     first_received: float
     first_ns: int

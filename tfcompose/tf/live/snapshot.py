@@ -47,10 +47,10 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
 
 
-#: So many headers say what a topic's are like; then it is not listened to any more, as data may be
-#: large.
+#: Number of headers that show what a topic's are like. After them the topic is closed, because its
+#: data may be large.
 ENOUGH = 20
-#: So many topics are listened to.
+#: Maximum number of topics that are subscribed.
 MOST = 100
 
 
@@ -203,7 +203,7 @@ ASK_EVERY_S = 0.5
 CLOCK_STANDS_S = 2.0
 #: Nodes of tools that look, as this one does, say nothing about the robot; a plan's do.
 TOOLS = ("/tfcompose_", "/_ros2cli_")
-#: What is looked at besides TF itself.
+#: Types of topics that are observed in addition to TF itself.
 INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs/msg/JointState")
 
 

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.publishers import Publisher
     from tfcompose.tf.live.sent_joints import SentJoints
 
-#: How a publisher is called whose node has no name.
+#: Name of a publisher whose node has no name.
 NAMELESS = "a publisher without a node name"
-#: Who publishes with DDS and without ROS.
+#: Name of a publisher that uses DDS without ROS.
 NO_NODE = "a DDS program that is not a ROS node"
 
 

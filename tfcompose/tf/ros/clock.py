@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-#: After so many seconds without simulated time it is said: a plan with ``ros.clock: sim`` would
-#: stand still in silence.
+#: A missing simulated time is reported after this many seconds; otherwise a plan with ``ros.clock:
+#: sim`` would silently stand still.
 CLOCK_AFTER_S = 5.0
 
 _LENGTH = 12

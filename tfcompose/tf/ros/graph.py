@@ -37,17 +37,17 @@ if TYPE_CHECKING:
 
     from tfcompose.tf.ros.zenoh_graph import RobotGraph
 
-#: What rmw says instead of a name while it does not know whose node a publisher is.
+#: Name that rmw gives while it does not know a publisher's node.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-#: What rmw_fastrtps says instead of name and namespace where a publisher is of no ROS node.
+#: Name and namespace that rmw_fastrtps gives to a publisher without a ROS node.
 BARE_DDS = "_CREATED_BY_BARE_DDS_APP_"
-#: Where the rmw is asked whose ids come with messages; hidden from lists of topics by its first
-#: underscore.
+#: Topic on which the rmw is probed for the ids that come with messages; its leading underscore
+#: hides it from lists of topics.
 ASKING = "/_tfcompose/who_am_i"
-#: How long one's own publisher may take to come into the graph, in seconds.
+#: Time within which one's own publisher must appear in the graph, in seconds.
 SHOWN_WITHIN_S = 0.5
 
-#: The names of so many publishers and listeners are remembered.
+#: Number of publishers and listeners whose names are remembered.
 MOST_NAMES = 10_000
 
 #: Sizes of a wait set: subscriptions, guard conditions, timers, clients, services, events.
@@ -58,7 +58,7 @@ _says_who: dict[str, bool] = {}
 #: participant that DDS had given up, as after a gap in the network, returns with its ids, and
 #: rmw_fastrtps does not get its nodes' names again.
 _names: dict[bytes, str] = {}
-#: Where rmw_zenoh's tokens are asked instead of rclpy, the one graph of them.
+#: The only graph of rmw_zenoh's tokens, if they are used instead of rclpy.
 _tokens: list[RobotGraph] = []
 _changes: WeakKeyDictionary[Context, GraphChanges] = WeakKeyDictionary()
 

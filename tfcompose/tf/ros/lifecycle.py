@@ -10,10 +10,10 @@ from lifecycle_msgs.srv import ChangeState, GetState
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-#: How long an answer is waited for, and between two questions, in seconds.
+#: Maximum wait for an answer, and between two requests, in seconds.
 ANSWER_S = 5.0
 ASK_EVERY_S = 0.2
-#: After a transition that failed it is tried again so much later, in seconds.
+#: Time before a failed transition is tried again, in seconds.
 TRY_AGAIN_S = 2.0
 
 _NAMES = {

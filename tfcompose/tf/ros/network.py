@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.signals import Stop
 
-#: How often it is checked whether there is one, in seconds.
+#: Period between two checks for a network, in seconds.
 CHECK_EVERY_S = 0.5
 _FLAGS, _ADDRESS = 0x8913, 0x8915  # SIOCGIFFLAGS and SIOCGIFADDR of linux/sockios.h
 _LOOPBACK, _RUNNING = 0x8, 0x40  # IFF_LOOPBACK and IFF_RUNNING of linux/if.h

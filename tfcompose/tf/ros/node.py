@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bool, float)
 
-#: How long a node's leaving may take, in seconds: on a busy machine long, and less than until
-#: SIGTERM follows SIGINT.
+#: Time limit for closing a node, in seconds: long enough on a busy machine, and shorter than the
+#: time from SIGINT to SIGTERM.
 LEAVE_S = 3.0
 
 _OK = 0
@@ -80,7 +80,8 @@ def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> Qo
 TF_PUBLISHER = TF_READER = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 TF_STATIC_PUBLISHER = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 TF_STATIC_READER = qos(100, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
-#: How many messages a deep reader keeps until they are taken; of more the oldest are lost.
+#: Number of messages that a deep reader keeps until they are taken; beyond it, the oldest are
+#: lost.
 DEEP = 1000
 DEEP_TF_READER = qos(DEEP, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 DEEP_TF_STATIC_READER = qos(DEEP, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)

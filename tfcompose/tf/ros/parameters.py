@@ -12,8 +12,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-#: How long an answer is waited for, in seconds; a question whose answer is not there by then is
-#: asked again.
+#: Maximum wait for an answer, in seconds; then the request is repeated.
 ANSWER_S = 10.0
 
 Value = bool | int | float | str

@@ -23,7 +23,7 @@ _LIBRARY = "librcl.so"
 #: it forks, has its own, and two of LTTng's.
 _FEWEST_THREADS = 4
 _PREFIXES = ("ROS_", "RMW_")
-#: Of a command line so much is shown.
+#: Maximum number of characters shown of a command line.
 _SHOWN = 100
 _VENDOR = b"\x01\x0f"
 _WORD = 1 << 16

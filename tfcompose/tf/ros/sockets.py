@@ -19,7 +19,7 @@ from tfcompose.foundation import procfs
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: So many bytes each socket is to hold; the kernel grants at most ``LIMIT``.
+#: Requested receive buffer of each socket, in bytes; the kernel grants at most ``LIMIT``.
 WANTED = 16 * 1024 * 1024
 #: The kernel's limit, as sysctl names it.
 LIMIT = "net.core.rmem_max"

@@ -47,14 +47,13 @@ _STAMP = 8
 _IDENTITY = _POSE.pack(*Pose().xyz, *Pose().quat_xyzw)
 # Stamp, two empty names of 5 bytes, 56 bytes of doubles, and no padding: no transform is shorter.
 _SHORTEST = 8 + 5 + 5 + 56
-# Where the first transform's parent stands, behind the header, the number of transforms and a
-# stamp.
+# Offset of the first transform's parent: after the header, the number of transforms and a stamp.
 _FIRST_PARENT = 16
-# Layouts are remembered of messages that have together no more bytes than this, of one length and
-# beginning so many.
+# Limits of remembered layouts: the total size of their messages, and the number for one length and
+# beginning.
 _MOST_BYTES = 1 << 22
 _MOST_ALIKE = 8
-# What stands before a name, and for bytes in it that are not UTF-8.
+# Size of a name's prefix, and the handler for bytes in it that are not UTF-8.
 _LENGTH = 4
 _REPLACED = "\ufffd"
 #: The longest name that is shown; no planned frame's is that long.

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _SPACE, _PUBLISHER = "@ros2_lv", "MP"
-#: How many parts a publisher's token has; later releases may add some.
+#: Number of parts of a publisher's token; later releases may add some.
 _PARTS = 13
 _BEST_EFFORT, _TRANSIENT_LOCAL = "2", "1"
 _TYPE = re.compile(r"(.+)::dds_::(\w+)_")
@@ -47,11 +47,11 @@ _NAMES = (b"\x0fsequence_number", b"\x10source_timestamp", b"\x0asource_gid")
 _GID_BYTES = 16
 _ROUTER = '["tcp/localhost:7447"]'
 _TF_TYPE = "tf2_msgs::msg::dds_::TFMessage_"
-#: So many messages wait to be taken.
+#: Maximum number of messages that wait to be taken.
 _MOST_WAITING = 20_000
-#: So many tokens that came or went wait until somebody asks for publishers.
+#: Maximum number of tokens that came or went and wait until publishers are requested.
 _MOST_TOKENS = 100_000
-#: So many latched messages of a publisher are asked for.
+#: Number of latched messages requested of a publisher.
 _LATCHED = 100
 
 

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Stamps = NDArray[np.int64]
 
-# So many times are handled at once, with so many arrays of their length at most.
+# Number of times handled at once, which bounds the length of temporary arrays.
 _BLOCK = 1 << 14
 _ARRAYS = 64
-# So many points at a time stay in the processor's cache.
+# Number of points that fit into the processor's cache.
 _POINTS = 1 << 13
 # Angles, in radians, up to which sine and cosine are summed up, to x¹³ and x¹².
 _SMALL = 0.4

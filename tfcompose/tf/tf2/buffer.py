@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 _Answer = TypeVar("_Answer")
 
-# How often a waiting buffer takes messages itself, in seconds.
+# Period at which a waiting buffer takes messages itself, in seconds.
 _POLL_S = 0.005
 
 

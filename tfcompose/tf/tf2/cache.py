@@ -33,13 +33,13 @@ from tfcompose.tf.tf2.poses import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Mapping, Sequence
 
-#: What became of a sample: it was too old; taken; taken, and it changed a fixed pose or a parent.
+#: Outcome of inserting a sample: too old; taken; or taken and changed a fixed pose or a parent.
 Outcome = Literal["old", "taken", "changed"]
 
 #: Seven doubles as an array holds them.
 pack_pose = struct.Struct("7d").pack
 
-# Expired samples are removed so many at a time.
+# Number of expired samples removed at a time.
 _COMPACT = 256
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from tfcompose.tf.tf2.buffer import Buffer
 
-# So many different warnings are logged at most, each once.
+# Maximum number of different warnings, each logged once.
 _MOST_WARNINGS = 200
 
 

@@ -337,8 +337,7 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
     return moved
 
 
-#: What ``Buffer.transform`` does with a message, by the name of its type; ``registration`` takes
-#: others.
+#: Functions of ``Buffer.transform`` by the name of the message type; ``registration`` adds others.
 TRANSFORMS: dict[str, Callable[[Any, Any], Any]] = {
     "PointStamped": do_transform_point,
     "Vector3Stamped": do_transform_vector3,

@@ -34,11 +34,11 @@ from tfcompose.tf.tf2.poses import IDENTITY, PoseTuple, product, unit
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-#: How long samples are kept before the newest of their edge, as in tf2.
+#: Time that samples are kept before the newest of their edge, as in tf2.
 CACHE_NS = 10_000_000_000
 # Closer to 1 than this a sum of four squares cannot be told from 1.
 _ROUNDING = 1e-15
-# So many chains are remembered at most.
+# Maximum number of remembered chains.
 _MOST_CHAINS = 4096
 _SECOND_NS = 1_000_000_000
 

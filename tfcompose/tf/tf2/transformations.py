@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Numbers = Sequence[float] | Floats
 
 _AXES = "xyz"
-# Below this a number is rounding: two rotations are as good as one, or a rotation is none.
+# Below this, a number is rounding: two rotations count as equal, or a rotation as the identity.
 _ROUNDING = 4 * np.finfo(float).eps
 
 

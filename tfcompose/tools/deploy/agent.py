@@ -2,8 +2,8 @@
 
 ``connection`` sends this file's text over ssh to the host's Python, which runs it: it needs only
 the standard library, not tfcompose. It answers requests, one line of JSON each, in order, until
-its input ends. If that happens while a release is on trial, the deploying computer is gone, and
-the agent returns to the previous release by itself.
+its input ends. If the input ends while a release is on trial, the deploying computer is gone, and
+the agent returns to the previous release on its own.
 
 On the host, ``base`` holds ``releases/NAME``, the link ``current`` to the release that systemd
 starts, the link ``previous`` to the one before, and ``lock``. A release on trial is started by a
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
     import io
     from collections.abc import Callable, Mapping
 
-#: How long systemctl may take to start or stop, and other programs, in seconds.
+#: Time limits of systemctl to start or stop, and of other programs, in seconds.
 UNIT_S, PROGRAM_S = 120.0, 60.0
-#: How many releases are kept, the current one and the one before among them.
+#: Number of releases that are kept, including the current and the previous one.
 KEPT = 5
-#: The file in a release that holds the unit that starts it as the current one.
+#: The file in a release with the unit that starts it as the current release.
 UNIT = "unit"
 #: Larger files are not sent back to be compared.
 MOST_TEXT = 200_000
-#: Prints what the host's Python has, with the setup files sourced; modules of the current folder
-#: come last.
+#: Program that prints the versions and variables of the host's Python, after sourcing the setup
+#: files; modules of the current folder come last.
 _PROBE = """
 import os, sys
 sys.path.sort(key=["", os.getcwd()].__contains__)
@@ -91,7 +91,7 @@ class Agent:
         self._be_of(system=settings["system"])
 
     def _be_of(self, *, system: bool) -> None:
-        """Take the folders of the system's units, or of the user's."""
+        """Use the folders of system units or of user units."""
         self.system = system
         home, runtime = Path.home(), Path(os.environ.get("XDG_RUNTIME_DIR", "/run"))
         self.base = (
@@ -100,7 +100,7 @@ class Agent:
         self.units = Path("/etc/systemd/system") if system else home / ".config/systemd/user"
         self.runtime = Path("/run/systemd/system") if system else runtime / "systemd/user"
 
-    # What is asked before anything changes.
+    # Requests before anything changes.
 
     def probe(self) -> dict[str, Any]:
         """Return the host's Python, tfcompose, environment, systemd and folders."""
@@ -273,7 +273,7 @@ class Agent:
     def follow(self, release: str, host: str) -> str:
         """Let the launcher follow a release on trial, and return its answer.
 
-        A launcher that cannot is stopped, and the release started.
+        If the launcher cannot, stop it and start the release.
         """
         self.trial = {"active": True, "host": host}
         _write(
@@ -288,9 +288,7 @@ class Agent:
             return f"restarted: {error}"
 
     def _follow(self, release: str, host: str) -> str:
-        """Let the launcher follow a release.
-
-        Files that are not built are the same, and where they were.
+        """Let the launcher follow a release, in which only built files may differ.
 
         Raises:
             HostError: if it does not.
@@ -347,7 +345,7 @@ class Agent:
         }
 
     def _has_failed(self, shown: dict[str, str]) -> bool:
-        """Whether the unit has ended by itself since it was examined, or started here."""
+        """Whether the unit has exited on its own since it was last examined or started here."""
         return shown.get("ActiveState") == "failed" or _restarts(shown) > self.restarts
 
     def commit(self, release: str) -> None:
@@ -370,7 +368,7 @@ class Agent:
     def back(self) -> dict[str, Any] | None:
         """Return to the release before the trial, and start it if it was running.
 
-        Also after ``commit``. None: no release is on trial.
+        This also works after ``commit``. Return None if no release is on trial.
         """
         trial, self.trial, self.running = self.trial, None, None
         if trial is None:
@@ -392,7 +390,7 @@ class Agent:
         return {"release": release, "active": bool(release and trial["active"])}
 
     def _return(self, release: str, host: str | None) -> None:
-        """Run the current release again; a ``host`` whose launcher followed another goes on."""
+        """Run the current release again; if the launcher only followed another, let it go back."""
         if host is not None:
             with contextlib.suppress(HostError):
                 self._follow(release, host)
@@ -402,7 +400,7 @@ class Agent:
             self._systemctl("stop", self.unit)
         self._must("start", self.unit)
 
-    # Everything else.
+    # Other requests.
 
     def execute(self, argv: list[str]) -> None:
         """Replace this process with tfcompose and these arguments, in the robot's environment.
@@ -429,7 +427,7 @@ class Agent:
         self._must("daemon-reload")
 
     def _install(self, folder: Path) -> None:
-        """Make the release's own Python of its wheels, over what the host's Python has."""
+        """Install the release's wheels into a separate Python on top of the host's."""
         python = self._executable()
         wheels = sorted(map(str, (folder / "wheels").glob("*.whl")))
         for argv in (
@@ -476,10 +474,7 @@ class Agent:
         return self._program([*self._start(python), *argv], seconds)
 
     def _environment(self) -> dict[str, str]:
-        """Return the environment in which the run is found.
-
-        That of the unit, where it differs from a login's.
-        """
+        """Return the environment in which the run can be found: the unit's, over a login's."""
         if not self.system:
             return dict(os.environ)
         return {
@@ -522,10 +517,7 @@ class Agent:
             return None
 
     def _manifest(self, release: str | None) -> dict[str, str]:
-        """Return the digests of the files of a release, by their paths.
-
-        Not those of what was installed of wheels.
-        """
+        """Return the digests of a release's files by path, without files from wheels."""
         if release is None:
             return {}
         folder = self.base / "releases" / release
@@ -538,10 +530,7 @@ class Agent:
         }
 
     def _launched_folder(self) -> Path | None:
-        """Return the folder of the plan that the running launcher was started with.
-
-        It is given files below it.
-        """
+        """Return the folder of the running launcher's first plan, below which it gets files."""
         pid = self._show_unit().get("MainPID") or "0"
         try:
             argv = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")
@@ -610,7 +599,7 @@ def _text(file: Path, most: int | None = MOST_TEXT) -> str | None:
 
 
 def _write(file: Path, text: str) -> None:
-    """Write the file; who reads it meanwhile sees the one before."""
+    """Write the file atomically: readers see the old content or the new one."""
     file.parent.mkdir(parents=True, exist_ok=True)
     new = file.with_name(f".{file.name}.new")
     new.write_text(text, encoding="utf-8")
@@ -618,14 +607,14 @@ def _write(file: Path, text: str) -> None:
 
 
 def _link(link: Path, target: str) -> None:
-    """Let the link lead there; who follows it meanwhile comes to where it led before."""
+    """Point the link to the target atomically."""
     new = link.with_name(f".{link.name}.new")
     new.unlink(missing_ok=True)
     new.symlink_to(target)
     new.replace(link)
 
 
-#: What may be asked.
+#: Names of the requests.
 _REQUESTS = (
     "probe",
     "clock",
@@ -656,7 +645,7 @@ def serve() -> None:
         while line := sys.stdin.buffer.readline():
             requests.put(line)
             if b'"execute"' in line[:20]:
-                return  # what follows is for tfcompose
+                return  # the remaining arguments are for tfcompose
         gone.set()
         requests.put(b"")
 

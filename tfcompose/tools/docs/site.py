@@ -71,7 +71,7 @@ class _Site:
             for title, group in commands.items()
         ]
         self._keys = PageGroup("Keys", list(map(builder.keys, languages_with_reference())))
-        codes = [builder.code(code, tool) for code, tool in _tools_of_codes().items()]
+        codes = [builder.code(code, tool) for code, tool in sorted(_tools_of_codes().items())]
         self._families = [
             PageGroup(FAMILY_TITLES[family], pages, family)
             for family in FAMILIES
@@ -91,7 +91,7 @@ class _Site:
             list(_pages_of(self._topics)),
             list(_pages_of(self._commands)),
             self._keys.pages,
-            list(_pages_of(self._families)),
+            sorted(_pages_of(self._families), key=lambda code: code.name),
         ):
             neighbours = zip([None, *pages], [*pages[1:], None], strict=False)
             for page, (before, after) in zip(pages, neighbours, strict=True):

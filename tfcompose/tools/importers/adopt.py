@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import ImportDraft
 
 _LAUNCH_ENDINGS = (".py", ".xml", ".launch", ".yaml", ".yml")
-#: What an external process keeps of one that was started.
+#: Keys of a started process that an external process keeps.
 _KEPT = ("node", "namespace")
 
 

@@ -33,7 +33,7 @@ def with_ros_arguments(program: Program) -> Program:
     return _without_ros_arguments(program) if program.package is not None else program
 
 
-#: What a shell does more with than take it as a part of a word.
+#: Characters that mean more to a shell than a part of a word.
 _OF_SHELLS = re.compile(r"[$`|&;<>(){}*?~#\[\]!\n]|^\s*\w+=")
 
 

@@ -45,7 +45,7 @@ SECTIONS = (
     "processes",
     "rules",
 )
-#: So near to 1 a quaternion's length is left as the source has it.
+#: A quaternion whose length is this close to 1 is kept as it is in the source.
 _UNIT = 1e-7
 #: Errors of a robot file that are warnings where its source is so, and why.
 _OF_SOURCE = {

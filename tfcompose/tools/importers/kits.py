@@ -28,17 +28,16 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import ImportDraft
 
 _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Of Clearpath's mounts those that are in a folder of their own.
+#: Clearpath's mounts that are in a separate folder.
 _PACS = frozenset({"bracket", "riser"})
-#: What all macros are written for: the generated robot includes it.
+#: File that all macros need: the generated robot includes it.
 _COMMON = "package://clearpath_platform_description/urdf/common.urdf.xacro"
-#: What of an entry the macro's call has, and not its parameters.
+#: Keys of an entry that go into the macro's call, not its parameters.
 _OF_CALL = frozenset({"parent", "xyz", "rpy", "name", "type", "enabled", "urdf_enabled"})
 _LINKS = ("box", "cylinder", "frame", "mesh", "sphere")
-#: Where everything is mounted that names no parent.
+#: Mount of everything that names no parent.
 _MOUNT = "default_mount"
-#: What attachments are unless the file says otherwise, by platform and type.
-#: The generator writes all of it.
+#: Default attachments by platform and type. The generator writes all of them.
 _ATTACHMENTS: dict[str, dict[str, Any]] = {
     "a200.bumper": {"parent": "front_bumper_mount", "extension": 0.0},
     "a200.sensor_arch": {"model": "sensor_arch_300"},

@@ -164,7 +164,7 @@ _NODE = (
         "ros1?": bool,
     }
 )
-#: What the process that reads a launch file answers, by the kind of a record.
+#: Shape of the launch reader's answer, by kind of record.
 _RECORDS: dict[str, Any] = {
     "node": _NODE,
     "container": _NODE,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Attributes of the context that are kept for later visits.
 _SCOPE = ("params", "conditions", "whens", "period_s", "after", "depth")
-#: How deep launch files include each other.
+#: Maximum depth of launch files that include each other.
 _DEEPEST = 30
 
 

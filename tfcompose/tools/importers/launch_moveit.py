@@ -19,15 +19,14 @@ if TYPE_CHECKING:
 
     from tfcompose.tools.importers.launch_context import RecordingContext
 
-#: What a method of the builder reads unless it is told a file, and the parameter that it is, if it
-#: is one.
+#: Default files of the builder's methods, and the parameter, if any, that each sets.
 _FILES = {
     "robot_description_kinematics": ("config/kinematics.yaml", "robot_description_kinematics"),
     "joint_limits": ("config/joint_limits.yaml", "robot_description_planning"),
     "pilz_cartesian_limits": ("config/pilz_cartesian_limits.yaml", "robot_description_planning"),
     "moveit_cpp": ("config/moveit_cpp.yaml", ""),
 }
-#: What MoveIt's configuration has even if nobody asks for it.
+#: Parts of MoveIt's configuration that are always there.
 _USUAL = (
     "robot_description",
     "robot_description_semantic",
@@ -38,8 +37,7 @@ _USUAL = (
     "sensors_3d",
     "joint_limits",
 )
-#: What the monitor of the scene publishes unless it is told, by the parameters that say so, in the
-#: builder's order.
+#: Default outputs of the scene monitor by the parameters that set them, in the builder's order.
 _MONITOR = {
     "publish_planning_scene": True,
     "publish_geometry_updates": True,

@@ -39,7 +39,7 @@ MOST_RECORDS = 20_000
 _HIGHEST = 12
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 
-#: What a launch file is not let do, by the names of Python's audit events.
+#: Python audit events that a launch file may not cause.
 _REFUSED = frozenset(
     {
         "os.system",
@@ -84,7 +84,7 @@ _REFUSED = frozenset(
         "ctypes.addressof",
     }
 )
-#: What reads a path.
+#: Audit events that read a path.
 _READS = frozenset({"open", "os.listdir", "os.scandir"})
 #: Packages of which only programs are named, that are not run here.
 _TOOLS = {"xacro"}

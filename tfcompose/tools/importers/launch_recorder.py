@@ -262,7 +262,7 @@ def _describe_node(arguments: Mapping[str, Any]) -> str:
     return f"the node {describe(arguments.get('package'))}/{describe(arguments['executable'])}"
 
 
-#: What actions are for people, by their classes, a derived one before its base.
+#: Descriptions of actions for people, by class; a derived class comes before its base.
 _DESCRIBED: tuple[tuple[type, Callable[[Mapping[str, Any]], str]], ...] = (
     (
         launch.actions.DeclareLaunchArgument,
@@ -674,7 +674,7 @@ def _output(value: Any, context: RecordingContext) -> str | list[str]:
     return place
 
 
-#: What reads a keyword's value, by its kind.
+#: Functions that read a keyword's value, by kind.
 _READERS: dict[KeywordKind, Callable[[Any, RecordingContext], Any]] = {
     "text": text_of,
     "switch": is_true,
@@ -733,7 +733,7 @@ def _component(component: Any, container: str, context: RecordingContext) -> Non
     )
 
 
-#: What is recorded, by the class of an action or the nearest that it is derived from.
+#: Functions that record an action, by its class or the nearest base class.
 _HANDLERS: dict[type, Callable[[Any, RecordingContext], None]] = {
     launch.actions.DeclareLaunchArgument: _declare,
     launch.actions.SetLaunchConfiguration: _set_configuration,

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 #: As what the folder of a package begins that is not found.
 PACKAGE = "package://"
-#: What tells actions apart in records; Python's ``id`` is given again to another one once an
-#: action is gone.
+#: Numbers of actions in records; Python reuses an ``id`` once an action is gone.
 IDS = itertools.count(1)
 
 

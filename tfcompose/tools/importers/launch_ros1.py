@@ -41,10 +41,10 @@ from tfcompose.tools.importers.texts import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-#: How deep launch files include each other.
+#: Maximum depth of launch files that include each other.
 _DEEPEST = 30
-#: What a launch file of ROS 1 has and one of ROS 2 does not: attributes by their elements,
-#: elements, and substitutions.
+#: Features that only launch files of ROS 1 have: attributes by their elements, elements, and
+#: substitutions.
 _ATTRIBUTES = frozenset({("node", "type"), ("param", "command"), ("param", "textfile")})
 _ELEMENTS = frozenset({"rosparam", "machine", "test"})
 _SUBSTITUTION = re.compile(r"\$\((arg|find|optenv|env|anon|dirname|eval)\b\s*([^)]*)\)")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from tfcompose.tools.importers.launch_records import LaunchRecording
 
-#: So much one file may hold, in characters or bytes.
+#: Maximum size of one file, in characters or bytes.
 MOST = 1_000_000
 _READABLE = frozenset("rbt")
 _write = os.write

@@ -32,7 +32,7 @@ _Sections = dict[tuple[str, int], dict[str, Any]]
 #: The section of a parameter file that means every node.
 _ANY = "/**"
 _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-#: Of a parameter file.
+#: Maximum size of a parameter file.
 MOST_BYTES = 16_000_000
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import ImportDraft
     from tfcompose.tools.importers.sensors import Recognised
 
-#: The process that owns moving edges whose publisher nobody knows, as in a bag.
+#: Process that owns moving edges whose publisher is unknown, as in a bag.
 RECORDED = "recorded"
 #: The node of tfcompose's own that publishes fixed edges.
 STATIC = "tfcompose_static"
@@ -228,7 +228,7 @@ class Observed:
         return RECORDED
 
 
-#: How ROS 2's static_transform_publisher names its node unless it is told.
+#: Default node names of ROS 2's static_transform_publisher.
 _ANONYMOUS = re.compile(r"static_transform_publisher_[A-Za-z0-9]{16}")
 _ANEW = (
     "its node name changes at each start: set it with -r __node:=NAME, or remove owner and"

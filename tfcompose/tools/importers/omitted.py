@@ -33,7 +33,7 @@ _NOT_HELD = {
     "limit": ("acceleration", "jerk", "deceleration"),
     "calibration": ("reference_position",),
 }
-#: What has no effect in a joint that does not move.
+#: Elements that have no effect in a fixed joint.
 _OF_MOTION = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
 #: Blocks that are ignored if they refer to nothing; ros2_control does not start with an unknown
 #: joint.

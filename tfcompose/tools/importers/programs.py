@@ -46,7 +46,7 @@ _FROM_TOPIC = (
 _PLUGIN = re.compile(r"[A-Za-z]\w*/[A-Za-z_]\w*(::\w+)*", re.ASCII)
 #: Between the words of a class's name.
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-#: How often joint_state_publisher sends, unless it is told.
+#: Default rate of joint_state_publisher.
 _JOINTS_HZ = 10.0
 
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.sensors import Recognised
 
 
-#: Who publishes planar and floating joints: a URDF does not say it.
+#: Owner of planar and floating joints, whose publisher a URDF does not name.
 MOVER = "mover"
 
 

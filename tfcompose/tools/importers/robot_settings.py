@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import ImportDraft
 
 _TF = ("/tf", "/tf_static")
-#: What of the environment is a setting of all processes.
+#: Environment variables that are settings of all processes.
 _SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
-#: What several robots are in a robot file.
+#: Advice for a source with several robots.
 SEVERAL = "several robots are parts, each with its namespace, or a fleet: import each on its own"
 
 

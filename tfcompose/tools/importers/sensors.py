@@ -152,7 +152,7 @@ def _question(name: str, mount: Edge, presets: list[str]) -> str:
     return f"{what} If so, write {entry}, with its pose, in the place of these frames"
 
 
-#: What is written behind a sensor's name in the name of the frame that it is mounted by.
+#: Suffixes of a sensor's name in the name of its mount frame.
 _MOUNTS = re.compile(r"(?<=.)_(?:(?:base|camera|mount)_)?(?:link|frame|mount|base|center)$")
 
 
@@ -443,7 +443,7 @@ class _Search:
         return _FrameMatch(edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, tells)
 
 
-#: What names no model: a kind of sensor.
+#: Kinds of sensors, which name no model.
 _KINDS = frozenset(get_args(SensorKind))
 _SHORTEST = 3
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ASSIGNMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)=(.*)", re.DOTALL)
-#: What prepares a shell or shows something, and starts nothing of a robot.
+#: Commands that prepare a shell or print something, and start nothing of a robot.
 _OF_SHELL = frozenset(
     {
         "source",
@@ -58,16 +58,16 @@ _OF_SHELL = frozenset(
         "tfcompose",
     }
 )
-#: What changes files or ends processes; whether the robot needs it is for its owner to say.
+#: Commands that change files or end processes; only the robot's owner knows whether it needs them.
 _ONCE = frozenset(
     {"mkdir", "cp", "mv", "rm", "ln", "touch", "chmod", "chown", "kill", "pkill", "killall", "git"}
 )
-#: What stands before a command in a terminal: a prompt, ``me@host:~$``, and the number and the
-#: time of ``history``.
+#: Text before a command in a terminal: a prompt, ``me@host:~$``, and the number and the time of
+#: ``history``.
 _PROMPT = re.compile(r"[$%>]|[^\s@=]+@[^\s=]*[$#%>]")
 _NUMBER = re.compile(r"\d+\*?")
 _TIME = re.compile(r"\d{1,4}[-/.]\d\d?[-/.]\d{1,4}|\d\d?:\d\d(:\d\d)?")
-#: What of lines shows that they are of ROS.
+#: Words that show that a line is about ROS.
 _OF_ROS = re.compile(
     r"\b(ros2|rosrun|roslaunch|static_transform_publisher|robot_state_publisher|roscore)\b"
 )
@@ -99,7 +99,7 @@ _PREFIXES = frozenset(
         "numactl",
     }
 )
-#: What a shell in a terminal does at last so that the terminal stays open.
+#: Last commands of a shell that keep its terminal open.
 _STAYS_OPEN = frozenset({("exec", "bash"), ("bash",), ("read",), ("exec", "$SHELL"), ("$SHELL",)})
 _CONTROL = frozenset(
     {

@@ -29,7 +29,7 @@ _PARAMETERS = {
     "child_frame_id": "--child-frame-id",
 }
 
-#: Who reads the arguments: the program of ROS 2, that of ROS 1's tf, or that of ROS 1's tf2_ros.
+#: Program that reads the arguments: that of ROS 2, of ROS 1's tf, or of ROS 1's tf2_ros.
 Reader = Literal["ros2", "tf", "tf2_ros"]
 
 _POSITION = ("--x", "--y", "--z")

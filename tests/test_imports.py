@@ -234,7 +234,7 @@ def test_no_module_imports_itself_by_way_of_others_not_even_for_its_types() -> N
         graph[module] = {
             name
             for name in submodules
-            if not any(one.startswith(f"{name}.") for one in submodules)
+            if not any(submodule.startswith(f"{name}.") for submodule in submodules)
         }
     graphlib.TopologicalSorter(graph).prepare()
 
@@ -389,13 +389,13 @@ def test_reading_and_supervising_a_plan_loads_no_compiler_and_little_from_elsewh
 
 
 def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_requested(bare: set[str]) -> None:
-    one = (
+    program = (
         "from tfcompose.tf.tf2 import Buffer; from tfcompose.foundation.geometry import Pose; b ="
         " Buffer(); "
     )
-    one += "b.set('a', 'b', Pose(), 1, static=False); b.lookup_transform('a', 'b', 0)"
-    assert not foreign(loaded_by(one), bare)
-    assert "numpy" in foreign(loaded_by(one + "; b.lookup_many('a', 'b', [1])"), bare)
+    program += "b.set('a', 'b', Pose(), 1, static=False); b.lookup_transform('a', 'b', 0)"
+    assert not foreign(loaded_by(program), bare)
+    assert "numpy" in foreign(loaded_by(program + "; b.lookup_many('a', 'b', [1])"), bare)
 
 
 def test_the_buffer_stands_on_its_own() -> None:

@@ -126,7 +126,7 @@ def _edges(tree: str) -> list[str]:
 
 
 def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
-    (block,) = (one for one in blocks("console") if one.startswith("$ tfcompose lint"))
+    (block,) = (block for block in blocks("console") if block.startswith("$ tfcompose lint"))
     shown = block.removeprefix("$ tfcompose lint rover.yaml\n")
     broken = (
         blocks("yaml")[0]
@@ -224,7 +224,7 @@ def test_each_command_says_what_it_does_and_what_its_arguments_are(command: str)
 
 
 def test_its_first_commands_are_those_that_init_names(tmp_path: Path) -> None:
-    (block,) = (one for one in blocks("console") if one.startswith("$ tfcompose init"))
+    (block,) = (block for block in blocks("console") if block.startswith("$ tfcompose init"))
     assert tfcompose_in(tmp_path, "init").stdout == block.partition("\n")[2]
 
 

@@ -93,7 +93,7 @@ def measure_all(
     failures: list[str] = []
     for name in names:
         benchmark, began = benchmark_of(name), time.monotonic()
-        (own,) = [one for one in benchmark.contenders if one == TFCOMPOSE]
+        (own,) = [contender for contender in benchmark.contenders if contender == TFCOMPOSE]
         if reason := own.missing():
             _say(f"{name}: left out: {reason}")
             continue

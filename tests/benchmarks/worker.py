@@ -23,7 +23,9 @@ def result_of(
 ) -> Result:
     """Return what was measured, with the machine, the day, and the load of a minute before."""
     contenders = benchmark.contenders
-    installed = {one.name: one.version() for one in contenders if not one.missing()}
+    installed = {
+        contender.name: contender.version() for contender in contenders if not contender.missing()
+    }
     return Result(
         about=benchmark.about,
         command=f"python -m tests.benchmarks --only {benchmark.name}",
@@ -31,7 +33,9 @@ def result_of(
         load=(round(load, 2), round(os.getloadavg()[0], 2)),
         machine=machine(),
         versions={name: version for name, version in installed.items() if version},
-        missing={one.name: one.missing() for one in contenders if one.missing()},
+        missing={
+            contender.name: contender.missing() for contender in contenders if contender.missing()
+        },
         rows={
             name: RowResult(row.title, row.unit, samples[name])
             for name, row in benchmark.rows.items()

@@ -287,9 +287,9 @@ def test_lint_in_json_without_findings_is_an_empty_list_and_a_missing_file_is_a_
     assert json.loads(tfcompose("lint", "--format", "json", cwd=folder).stdout) == []
     done = tfcompose("lint", "--format", "json", "nothing.yaml", cwd=folder)
     assert done.returncode == 2
-    assert [(one["code"], one["file"], one["line"]) for one in json.loads(done.stdout)] == [
-        ("TF001", "nothing.yaml", 1)
-    ]
+    assert [
+        (entry["code"], entry["file"], entry["line"]) for entry in json.loads(done.stdout)
+    ] == [("TF001", "nothing.yaml", 1)]
 
 
 def test_a_warning_fails_lint_only_with_strict(folder: Path) -> None:

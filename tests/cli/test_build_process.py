@@ -36,7 +36,9 @@ def build_of(launcher: subprocess.Popen[str]) -> psutil.Process:
     def builds() -> list[psutil.Process]:
         below = psutil.Process(launcher.pid).children()
         return [
-            one for one in below if any("pydantic_core" in each.path for each in one.memory_maps())
+            process
+            for process in below
+            if any("pydantic_core" in each.path for each in process.memory_maps())
         ]
 
     assert until(builds)
@@ -84,7 +86,7 @@ def test_up_ends_as_the_build_does(text: str | None, code: int, tmp_path: Path) 
         processes.run([sys.executable, "-m", "tfcompose", command, file], cwd=tmp_path)
         for command in ("build", "up")
     ]
-    assert {(one.returncode, one.stdout) for one in ends} == {(code, "")}
+    assert {(ended.returncode, ended.stdout) for ended in ends} == {(code, "")}
     assert ends[0].stderr == ends[1].stderr != ""
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def test_few_combinations_are_all_judged_and_the_defaults_first() -> None:
     every = combinations({"a": ("1", "2"), "b": ("x", "y", "z")}, {"a": "2", "b": "y"})
     assert every[0] == {"a": "2", "b": "y"}
-    assert len(every) == len({tuple(one.items()) for one in every}) == 6
+    assert len(every) == len({tuple(choice.items()) for choice in every}) == 6
 
 
 @pytest.mark.parametrize(("count", "values"), [(9, 2), (30, 2), (6, 5), (4, 9)])
@@ -28,9 +28,9 @@ def test_beyond_that_each_two_values_are_together_in_one(count: int, values: int
     alternatives = {f"a{i}": tuple(f"v{j}" for j in range(values)) for i in range(count)}
     every = combinations(alternatives, dict.fromkeys(alternatives, "v0"))
     assert len(every) <= MOST < values**count
-    for one, other in subsets(alternatives, 2):
-        assert {(row[one], row[other]) for row in every} == set(
-            product(alternatives[one], alternatives[other])
+    for subset, other in subsets(alternatives, 2):
+        assert {(row[subset], row[other]) for row in every} == set(
+            product(alternatives[subset], alternatives[other])
         )
 
 
@@ -43,15 +43,17 @@ def test_a_finding_is_named_by_the_fewest_arguments_that_say_where_it_is() -> No
     )
     judged = [
         (
-            one,
+            option,
             [always]
-            + [single] * (one["a"] == "1")
-            + [pair] * (one["a"] == one["b"] == "1")
-            + [two] * ("1" in {one["a"], one["b"]}),
+            + [single] * (option["a"] == "1")
+            + [pair] * (option["a"] == option["b"] == "1")
+            + [two] * ("1" in {option["a"], option["b"]}),
         )
-        for one in every
+        for option in every
     ]
-    notes = {one.message: [note.message for note in one.notes] for one in merge_findings(judged)}
+    notes = {
+        entry.message: [note.message for note in entry.notes] for entry in merge_findings(judged)
+    }
     assert notes["x"] == []
     assert notes["a"] == ["with a:=1"]
     assert notes["b"] == ["with a:=1 b:=1"]

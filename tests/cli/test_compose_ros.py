@@ -196,7 +196,7 @@ def test_events_are_reported_from_the_start_and_wait_returns_the_exit_code(
     assert kinds[0] == "ProcessState"
     assert kinds[-1] == "Ended"
     found = [event["found"] for event in events if event["event"] == "FindingShown"]
-    (found,) = [one for one in found if one["code"] not in LATE]
+    (found,) = [entry for entry in found if entry["code"] not in LATE]
     assert (found["code"], found["message"].split()[0], found["message"].split()[-1]) == (
         "TF808",
         "static",
@@ -265,7 +265,7 @@ def test_a_robot_in_the_background_is_listed_with_states_memory_and_edges() -> N
         assert psutil.pid_exists(process["pid"])
         assert process["memory"] > 1e5
     edges = [(1, 1), (1, 1), (0, 0), (0, 0)]
-    assert until(lambda: [(one["live"], one["edges"]) for one in ps(run).values()] == edges)
+    assert until(lambda: [(row["live"], row["edges"]) for row in ps(run).values()] == edges)
 
 
 @of_one_robot

@@ -83,8 +83,8 @@ def test_a_process_writes_to_the_terminal_or_into_its_log_as_its_output_says() -
     console = Console(
         plan, output, colour=False, keep=lambda name, text: kept.update({name: text})
     )
-    for one in processes:
-        console(LogLine(one.name, "stdout", f"line of {one.name}"))
+    for process in processes:
+        console(LogLine(process.name, "stdout", f"line of {process.name}"))
     assert kept == {name: f"line of {name}" for name in ("to_both", "to_log")}
     assert [
         name for name in ("to_both", "to_log", "to_screen") if f"line of {name}" in output.text

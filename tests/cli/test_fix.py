@@ -193,8 +193,8 @@ def test_where_the_answer_is_not_safe_the_file_stays_as_it_is(why: str, tmp_path
 
 def test_expressions_get_their_quotes_all_at_once(tmp_path: Path) -> None:
     text = HEAD + "frames: {lidar: {parent: base_link, xyz: [-${%s/2}, ${b}, 0]}}\n"
-    meant = HEAD + 'frames: {lidar: {parent: base_link, xyz: ["${-%s/2}", "${b}", 0]}}\n'
-    assert fixed(tmp_path, text % "a") == meant % "a"
+    expected = HEAD + 'frames: {lidar: {parent: base_link, xyz: ["${-%s/2}", "${b}", 0]}}\n'
+    assert fixed(tmp_path, text % "a") == expected % "a"
 
 
 def test_a_slip_of_the_pen_is_one_character_and_has_one_answer() -> None:
@@ -220,7 +220,7 @@ def test_a_link_stays_a_link_and_the_mode_stays(tmp_path: Path) -> None:
     assert (tmp_path / "r.yaml").is_symlink()
     assert real.read_text() == HEAD + EXAMPLES["a key"][1]
     assert real.stat().st_mode & 0o777 == 0o640
-    assert [one.name for one in real.parent.iterdir()] == ["real.yaml"]
+    assert [path.name for path in real.parent.iterdir()] == ["real.yaml"]
 
 
 def test_it_says_what_it_fixed_and_fails_for_what_remains(tmp_path: Path) -> None:
@@ -239,7 +239,9 @@ def test_json_holds_what_remains_and_stderr_what_was_fixed(tmp_path: Path) -> No
     file = tmp_path / "r.yaml"
     file.write_text(HEAD + "links: {a: {}, b: {parnet: a, colour: red}}\n")
     done = run(tmp_path, "r.yaml", "--format", "json")
-    assert [(one["code"], one["column"]) for one in json.loads(done.stdout)] == [("TF101", 31)]
+    assert [(entry["code"], entry["column"]) for entry in json.loads(done.stdout)] == [
+        ("TF101", 31)
+    ]
     assert re.search(r"fixed\[TF101\] .*\bparnet\b", done.stderr)
     assert done.returncode == 1
 
@@ -276,7 +278,7 @@ def test_a_file_that_cannot_be_saved_is_one_sentence_and_exit_2(tmp_path: Path) 
     assert os.strerror(errno.ENOSPC) in done.stdout
     assert "fixed[" not in done.stdout
     assert (tmp_path / "r.yaml").read_text() == text
-    assert [one.name for one in tmp_path.iterdir()] == ["r.yaml"]
+    assert [path.name for path in tmp_path.iterdir()] == ["r.yaml"]
 
 
 def test_an_edit_that_takes_nothing_away_is_not_kept(tmp_path: Path) -> None:
@@ -286,14 +288,14 @@ def test_an_edit_that_takes_nothing_away_is_not_kept(tmp_path: Path) -> None:
     fixer = Fixer(
         [str(file)], lambda *_: [finding("TF101", "still here", span, edits=[Edit(span, "other")])]
     )
-    assert [one.message for one in fixer.fix(str(file))] == ["still here"]
+    assert [entry.message for entry in fixer.fix(str(file))] == ["still here"]
     assert (fixer.texts, fixer.fixed) == ({}, [])
 
 
 def test_edits_that_meet_are_none() -> None:
-    one, other = Edit(Span("r", 1, 1, 1, 4), "x"), Edit(Span("r", 1, 3, 1, 6), "y")
-    assert apply_edits("abcdefg", [one]) == "xdefg"
-    assert apply_edits("abcdefg", [one, other]) is None
+    first, other = Edit(Span("r", 1, 1, 1, 4), "x"), Edit(Span("r", 1, 3, 1, 6), "y")
+    assert apply_edits("abcdefg", [first]) == "xdefg"
+    assert apply_edits("abcdefg", [first, other]) is None
     assert apply_edits("abcdefg", [Edit(Span("r", 3, 1, 3, 1), "y")]) is None
 
 
@@ -330,7 +332,7 @@ def test_the_second_time_there_is_nothing_to_fix_and_the_first_time_brings_nothi
         return text
 
     def findings(of: str) -> list[tuple[str, str]]:
-        return [(one.code, one.message) for one in lint("r.yaml", lambda _: of)]
+        return [(entry.code, entry.message) for entry in lint("r.yaml", lambda _: of)]
 
     fixer = Fixer([__file__], lambda _, read: lint(__file__, read))
     fixer._read[os.path.realpath(__file__)] = text

@@ -19,7 +19,9 @@ pytestmark = pytest.mark.ros
 def ps() -> dict[str, dict[str, str]]:
     robots = json.loads(tfcompose_in(Path.cwd(), "ps", "--format", "json").stdout or "[]")
     return {
-        robot["name"].partition("@")[0]: {one["name"]: one["state"] for one in robot["processes"]}
+        robot["name"].partition("@")[0]: {
+            process["name"]: process["state"] for process in robot["processes"]
+        }
         for robot in robots
     }
 

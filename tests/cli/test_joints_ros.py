@@ -131,7 +131,7 @@ def test_a_second_sender_of_a_joint_is_named_while_it_sends(tfc: Callable[..., s
         verifying = processes.start(verify, stdout=subprocess.PIPE)
         assert until(lambda: is_named() and verifying.poll() is not None)
         found = json.loads(verifying.communicate()[0])
-        assert {one["code"] for one in found} == {"TF860", "TF861"}
+        assert {entry["code"] for entry in found} == {"TF860", "TF861"}
         assert verifying.returncode == 1
     assert until(lambda: codes() == set())
 

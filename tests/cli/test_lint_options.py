@@ -40,7 +40,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def codes_of(done: subprocess.CompletedProcess[str]) -> set[str]:
-    return {one["code"] for one in json.loads(done.stdout)}
+    return {entry["code"] for entry in json.loads(done.stdout)}
 
 
 def test_select_and_ignore_leave_what_prevents_a_build(folder: Path) -> None:
@@ -125,7 +125,7 @@ def test_the_hook_skips_the_yaml_of_others_and_no_robot(folder: Path) -> None:
     assert "files" not in hook
     words = hook["entry"].split()[1:]
     done = tfcompose_in(folder, *words, "params.yaml", "wrong.yaml", "--format", "json")
-    assert {one["file"] for one in json.loads(done.stdout)} == {"wrong.yaml"}
+    assert {entry["file"] for entry in json.loads(done.stdout)} == {"wrong.yaml"}
     assert tfcompose_in(folder, *words, "params.yaml").returncode == 0
     assert tfcompose_in(folder, "lint", "params.yaml").returncode == 1
 

@@ -40,7 +40,10 @@ def observer() -> TreeObserver:
 
 
 def test_each_edge_has_its_publisher_its_kind_and_its_rate(observer: TreeObserver) -> None:
-    arrows = {(one.parent, one.child): one for one in graph_of_observers([observer], "/tf").arrows}
+    arrows = {
+        (arrow.parent, arrow.child): arrow
+        for arrow in graph_of_observers([observer], "/tf").arrows
+    }
     assert len(arrows) == 3
     moving, fixed, second = (
         arrows["odom", "base"],
@@ -59,8 +62,8 @@ def test_each_edge_has_its_publisher_its_kind_and_its_rate(observer: TreeObserve
 
 def test_poses_stand_below_and_a_rotation_that_is_none_is_reported(observer: TreeObserver) -> None:
     arrows = {
-        (one.parent, one.child): one
-        for one in graph_of_observers([observer], "/tf", poses=True).arrows
+        (arrow.parent, arrow.child): arrow
+        for arrow in graph_of_observers([observer], "/tf", poses=True).arrows
     }
     assert arrows["base", "lidar"].pose == "xyz 0.25 0 0"
     assert arrows["mast", "lidar"].pose == "no rotation"
@@ -79,7 +82,7 @@ def test_what_the_plan_expects_and_nobody_publishes_is_reported_to_be_missing(
     )
     plan = Plan("rover", "0", "base", RosSettings(), edges, ())
     graph = graph_of_observers([observer], "rover", plan)
-    assert [(one.child, one.owner) for one in graph.arrows if one.detail == "missing"] == [
+    assert [(arrow.child, arrow.owner) for arrow in graph.arrows if arrow.detail == "missing"] == [
         ("imu", "/static")
     ]
 

@@ -248,10 +248,10 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
     counting = PlanProcess("counting", "run", (sys.executable, "-I", "-S", "-c", count))
     file = tmp_path / "plan.json"
     file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), (*sleeping, counting))))
-    one = Terminal([sys.executable, "-c", LAUNCHER, str(file)], 60, 12)
-    yield one
-    if one.read(0):
-        os.kill(one.pid, signal.SIGKILL)
+    started = Terminal([sys.executable, "-c", LAUNCHER, str(file)], 60, 12)
+    yield started
+    if started.read(0):
+        os.kill(started.pid, signal.SIGKILL)
 
 
 def test_on_a_real_terminal_the_log_is_complete_the_line_below_it_and_ctrl_c_leaves_nothing(

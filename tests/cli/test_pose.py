@@ -51,12 +51,12 @@ def test_the_pose_up_one_branch_and_down_another(
     assert main(["pose", robot, "mast", "hand", "--format", "json"]) == 0
     output = json.loads(capsys.readouterr().out)
     assert (output["parent"], output["child"]) == ("mast", "hand")
-    meant = np.linalg.inv(mast) @ hand
+    expected = np.linalg.inv(mast) @ hand
     assert matrix(output["xyz"], Rotation.from_quat(output["quat_xyzw"])) == pytest.approx(
-        meant, abs=1e-11
+        expected, abs=1e-11
     )
     assert matrix(output["xyz"], Rotation.from_euler("xyz", output["rpy"])) == pytest.approx(
-        meant, abs=1e-11
+        expected, abs=1e-11
     )
 
 

@@ -114,8 +114,8 @@ def test_a_finding_about_a_replaced_value_names_what_it_replaced(
 ) -> None:
     main(["lint", robot, "--profile", profile, "--format", "json"])
     found = {
-        f"{one['code']} {one['file']}:{one['line']}:{one['column']}": one["notes"]
-        for one in json.loads(capsys.readouterr().out)
+        f"{entry['code']} {entry['file']}:{entry['line']}:{entry['column']}": entry["notes"]
+        for entry in json.loads(capsys.readouterr().out)
     }
     (note,) = found[found_at]
     assert f"{note['file']}:{note['line']}:{note['column']}" == replaced[0]
@@ -135,5 +135,10 @@ def test_a_finding_about_what_nothing_replaced_has_no_such_note(
     robot: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     main(["lint", robot, "--profile", "far", "--format", "json"])
-    others = [one for one in json.loads(capsys.readouterr().out) if one["code"] != "TF414"]
-    assert not [note for one in others for note in one["notes"] if "replaces" in note["message"]]
+    others = [entry for entry in json.loads(capsys.readouterr().out) if entry["code"] != "TF414"]
+    assert not [
+        note
+        for other_process in others
+        for note in other_process["notes"]
+        if "replaces" in note["message"]
+    ]

@@ -54,4 +54,4 @@ def test_findings_are_listed_and_in_the_json(
     assert ("TF801" in first, "TF861" in second) == (True, True)
     main(["ps", "--format", "json"])
     (robot,) = json.loads(capsys.readouterr().out)
-    assert [one["code"] for one in robot["findings"]] == ["TF801", "TF861"]
+    assert [entry["code"] for entry in robot["findings"]] == ["TF801", "TF861"]

@@ -191,7 +191,7 @@ def test_presets_have_no_expressions(language: str, file: str, line: str) -> Non
     if language == "node":
         validate = partial(validate_file, NodePresetSpec)
     value = "true" if "backward" in line or "one_of" in line else "1"
-    fine, wrong = (load(text + line.format(one), file) for one in (value, '"${a}"'))
+    fine, wrong = (load(text + line.format(filled), file) for filled in (value, '"${a}"'))
     validate(fine)
     validator(language).validate(fine.data)
     with pytest.raises(RejectedError):
@@ -211,7 +211,7 @@ def test_every_key_has_a_place_in_the_schema_and_every_mapping_says_what_it_is()
         schema = json.loads(schema_text(language))
         for definition in [
             schema,
-            *(one for one in schema["$defs"].values() if "properties" in one),
+            *(inner for inner in schema["$defs"].values() if "properties" in inner),
         ]:
             assert definition["description"]
             assert definition["additionalProperties"] is False

@@ -198,9 +198,9 @@ def test_monitor_takes_the_topics_of_the_robot_in_the_domain(
         for a, b, owner in edges
     )
     processes = tuple(PlanProcess(name, "external", remap=remap) for name, remap in remaps.items())
-    one = replace(PLAN, edges=planned[:1], processes=processes[:1])
+    small = replace(PLAN, edges=planned[:1], processes=processes[:1])
     runtime_dir = runs("rover", 67)
-    monkeypatch.setattr("tfcompose.cli.runs.plan_of_run", lambda _: one)
+    monkeypatch.setattr("tfcompose.cli.runs.plan_of_run", lambda _: small)
     assert monitor._namespace_here() == "/robot1"
     assert runtime_dir.name in capsys.readouterr().err
     monkeypatch.setattr(

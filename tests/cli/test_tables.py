@@ -98,9 +98,9 @@ def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(
     assert max(map(len, text.splitlines())) <= columns
     words = iter(re.sub("[│├└─]", " ", text).split())
     for edge in (
-        one
+        line
         for root in robot.roots()
-        for _, one in draw_tree(robot.children(), root, lambda edge: edge.child)
+        for _, line in draw_tree(robot.children(), root, lambda edge: edge.child)
     ):
         wanted = [edge.child, edge.owner, *pose_text(edge).split()]
         assert all(word in words for word in wanted), f"{wanted} stand there in this order"

@@ -71,13 +71,13 @@ def up(
         return running[-1]
 
     yield run
-    for one in running:
-        if one.popen.poll() is None:
-            below = one.below()
-            one.popen.kill()
-            one.popen.wait()
+    for robot in running:
+        if robot.popen.poll() is None:
+            below = robot.below()
+            robot.popen.kill()
+            robot.popen.wait()
             assert all(until(partial(gone, process)) for process in below)
-        assert "KeyboardInterrupt" not in one.text, (
+        assert "KeyboardInterrupt" not in robot.text, (
             "a process of its own was interrupted before it could handle it"
         )
 
@@ -124,7 +124,9 @@ def test_own_processes_are_forked_from_the_launcher_and_end_with_it(
     own = robot.below()
     # The kernel gives each program that is executed random bytes at an address of its own.
     vector = Path(f"/proc/{robot.popen.pid}/auxv").read_bytes()
-    forked = [one for one in own if Path(f"/proc/{one.pid}/auxv").read_bytes() == vector]
+    forked = [
+        process for process in own if Path(f"/proc/{process.pid}/auxv").read_bytes() == vector
+    ]
     assert {process.cmdline()[2] for process in forked} >= {"guard", "static"}
     assert all(process.environ()["TFCOMPOSE_RUN"] for process in forked)
     robot.popen.kill()
@@ -187,13 +189,15 @@ def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreport
     both = [up(ROVER), up(None, "other.yaml")]
 
     def ended() -> list[RunningRobot]:
-        return [one for one in both if one.popen.poll() is not None]
+        return [robot for robot in both if robot.popen.poll() is not None]
 
     def know() -> bool:
-        return all("error[TF854]" in one.text for one in both)
+        return all("error[TF854]" in robot.text for robot in both)
 
-    assert until(lambda: ended() or know()), [one.text for one in both]
-    assert know() or all("error[TF854]" in one.text for one in ended()), [one.text for one in both]
+    assert until(lambda: ended() or know()), [robot.text for robot in both]
+    assert know() or all("error[TF854]" in robot.text for robot in ended()), [
+        robot.text for robot in both
+    ]
 
 
 def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at_the_end(

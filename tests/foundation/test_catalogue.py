@@ -103,8 +103,8 @@ def test_a_file_that_is_not_understood_says_which_and_why(text: str, why: str) -
 
 
 def test_a_finding_has_the_name_and_the_severity_of_its_code_unless_it_says_otherwise() -> None:
-    one = finding("TF207", "message", None)
-    assert (one.name, one.severity) == ("wrong_chain_order", "warning")
+    warning = finding("TF207", "message", None)
+    assert (warning.name, warning.severity) == ("wrong_chain_order", "warning")
     assert finding("TF207", "message", None, severity="error").severity == "error"
     assert finding("TF201", "message", None).severity == "error"
 

@@ -40,9 +40,9 @@ def granted(of: Reach, folder: Path) -> set[str]:
     paths = of.grants().paths
     files = (path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
     return {
-        str(one.relative_to(folder))
-        for one in files
-        if any(one == Path(path) or Path(path) in one.parents for path in paths)
+        str(file.relative_to(folder))
+        for file in files
+        if any(file == Path(path) or Path(path) in file.parents for path in paths)
     }
 
 

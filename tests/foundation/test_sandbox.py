@@ -65,7 +65,7 @@ def test_the_filter_lets_nothing_pass_but_the_table(machine: str, *, files: bool
     table = sandbox._CALLS | (sandbox._FILE_CALLS if files else {})
     always = {numbers[column] for numbers in table.values()} - {None}
     conditions = [*sandbox._conditions(), *(sandbox._OPENS if files else ())]
-    conditional = {one.numbers[column] for one in conditions} - {None}
+    conditional = {condition.numbers[column] for condition in conditions} - {None}
     assert not always & conditional
     for number in range(1000):
         if number not in conditional:
@@ -120,8 +120,8 @@ CONDITIONS = [
 @pytest.mark.parametrize("machine", sandbox.MACHINES)
 @pytest.mark.parametrize(
     ("numbers", "passing", "refused"),
-    [one[1:] for one in CONDITIONS],
-    ids=[one[0] for one in CONDITIONS],
+    [condition[1:] for condition in CONDITIONS],
+    ids=[condition[0] for condition in CONDITIONS],
 )
 def test_some_calls_pass_with_some_arguments(
     machine: str,

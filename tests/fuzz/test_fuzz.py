@@ -70,7 +70,7 @@ def settle(text: str, profiles: tuple[str, ...] = ()) -> None:
         colour=True,
     )
     json.loads(render_json(compiled.findings))
-    assert not [one for one in compiled.findings if one.code == "TF903"]
+    assert not [finding for finding in compiled.findings if finding.code == "TF903"]
     if compiled.robot and not compiled.errors:
         for file in emit(compiled.robot):
             file.text.encode()
@@ -159,7 +159,7 @@ def test_any_change_of_a_plan_is_read_or_refused(data: Any) -> None:
     try:
         read_plan(json.dumps(data), "plan.json")
     except RejectedError as error:
-        assert {one.code for one in error.findings} == {"TF902"}  # noqa: PT017 (being read is fine too)
+        assert {finding.code for finding in error.findings} == {"TF902"}  # noqa: PT017 (being read is fine too)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_a_plan_with_a_wrong_value_in_an_edge_is_refused_or_read_and_never_crash
     try:
         read_plan(json.dumps(data), "plan.json")
     except RejectedError as error:
-        assert [one.code for one in error.findings] == ["TF902"]  # noqa: PT017 (being read is fine too)
+        assert [finding.code for finding in error.findings] == ["TF902"]  # noqa: PT017 (being read is fine too)
 
 
 @given(st.text())

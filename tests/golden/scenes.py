@@ -382,13 +382,13 @@ def _strangers() -> Iterator[guarded.History]:
     )
     for switch in ("enable_odom_tf: false", ""):
         yield _sent("/diff", "odom base", claims=(PlanClaim("/diff", "odom", "base", switch),))
-    nodes = tuple(replace(one, nodes=(f"/{one.name}er",)) for one in guarded.PROCESSES)
+    nodes = tuple(replace(process, nodes=(f"/{process.name}er",)) for process in guarded.PROCESSES)
     yield _sent("/slamer", "odom base", processes=nodes)
     yield _sent("/slamer", "map base", processes=nodes)
     twice = _running()
-    one, other = twice.joins("/slam"), twice.joins("/slam")
+    first, other = twice.joins("/slam"), twice.joins("/slam")
     for _ in range(10):
-        twice.send(one, "map odom").wait(0.1).send(other, "map odom").wait(0.1)
+        twice.send(first, "map odom").wait(0.1).send(other, "map odom").wait(0.1)
     yield twice
     unsure = _running(gids=False)
     unsure.joins("/drive")
@@ -427,9 +427,9 @@ def _shapes() -> Iterator[guarded.History]:
     yield _sent("/slam", "map odom", static=True)
     for names in (("/a", "/b"), ("/a", "/a")):
         both = _running(guard=GuardPolicy(allow=(EdgePattern("*", "person_*"),)))
-        one, other = (both.joins(name) for name in names)
+        first, other = (both.joins(name) for name in names)
         for _ in range(10):
-            both.send(one, "map person_1").send(other, "map person_1").wait(0.1)
+            both.send(first, "map person_1").send(other, "map person_1").wait(0.1)
         yield both
 
 
@@ -445,7 +445,7 @@ def _settings() -> Iterator[guarded.History]:
     history = _running()
     writers = [Publisher(b"w" * 16, "/slam", static=static) for static in (False, True)]
     history.judge.plan = replace(history.judge.plan, ros=RosSettings("/rover"))
-    inside = [replace(one, node="/rover/slam") for one in writers]
+    inside = [replace(writer, node="/rover/slam") for writer in writers]
     judge = type(history.judge)(history.judge.plan, 1.0, 0.0, 0)
     history.events += judge.leaks(inside, ("/rover/tf", "/rover/tf_static"))
     yield history
@@ -516,7 +516,7 @@ def _drivers() -> Iterator[Finding]:
         senders = Senders()
         senders.update([Publisher(b"g" * 16, node, static=True)])
         sent_poses = SentPoses(plan, senders)
-        sent_edges = tuple((one.parent, one.child) for one in edges[:count])
+        sent_edges = tuple((edge.parent, edge.child) for edge in edges[:count])
         off = [Pose((0.0, 0.1, 0.0))] * count
         sent_poses.take(
             Message(sent_edges, static=True, gid=b"g" * 16, source_ns=0, sequence=1, poses=off)
@@ -539,7 +539,7 @@ def launcher() -> Iterator[Finding]:
             findings = commands_of(
                 plan, list(plan.processes), file, base, environment.child_environment
             )[1]
-            yield from (_without(one, folder) for one in findings)
+            yield from (_without(entry, folder) for entry in findings)
     held = PlanProcess("lidar", "run", schedule=Schedule((4095,)))
     yield from check_settings(held) or [AN_EXAMPLE]
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
@@ -624,14 +624,14 @@ def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
                 parent,
                 child,
                 "dynamic",
-                one.name,
-                f"/{one.name}",
+                process.name,
+                f"/{process.name}",
                 Pose(),
                 None,
                 SourceLine("rover.yaml", 1),
             )
-            for one in processes
-            for parent, child in one.owns
+            for process in processes
+            for parent, child in process.owns
         )
         return Plan(
             "rover", "", None, ros or RosSettings(), edges, processes, guard or GuardPolicy()
@@ -691,7 +691,7 @@ def surroundings() -> Iterator[Finding]:
         yield from _refused(partial(read_plan, text, "plan.json"))
     plan = compiled_plan(ROVER)
     elsewhere = replace(
-        plan, processes=tuple(replace(one, host="jetson") for one in plan.processes)
+        plan, processes=tuple(replace(process, host="jetson") for process in plan.processes)
     )
     strict = replace(elsewhere, guard=GuardPolicy("strict"))
     shares = ((plan, "jetson"), (elsewhere, "jetsn"), (elsewhere, None), (strict, None))

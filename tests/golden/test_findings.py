@@ -325,7 +325,7 @@ def rows(name: str) -> list[str]:
         made = []
         for case, file, findings in CORPORA[name]():
             made += [
-                f"{case}: {row}\n" for row in sorted(row_of(one, file) for one in findings)
+                f"{case}: {row}\n" for row in sorted(row_of(finding, file) for finding in findings)
             ] or [f"{case}: none\n"]
         return made
 
@@ -335,11 +335,11 @@ def row_of(finding: Finding, file: str) -> str:
     words = [finding.code, place(finding.span, file)]
     words += ["warning"] if finding.severity == "warning" else []
     words += [
-        f"fix {place(one.span, file)} {json.dumps(one.text, ensure_ascii=False)}"
-        for one in ordered(finding.edits)
+        f"fix {place(edit.span, file)} {json.dumps(edit.text, ensure_ascii=False)}"
+        for edit in ordered(finding.edits)
     ]
     return " ".join(
-        [*words, *sorted(f"note {place(one.span, file)}" for one in finding.notes if one.span)]
+        [*words, *sorted(f"note {place(note.span, file)}" for note in finding.notes if note.span)]
     )
 
 

@@ -52,7 +52,7 @@ def findings() -> Iterator[Finding]:
 @cache
 def texts() -> dict[str, str]:
     """Return what is said, each text once, by its family: TF1xx."""
-    output = {text_of(one) for one in findings()}
+    output = {text_of(finding) for finding in findings()}
     return {
         f"{family}xx": "\n".join(
             sorted(text for text in output if f"[{family}" in text.partition(" ")[0])

@@ -76,9 +76,9 @@ def owners() -> Iterator[Started]:
 
 def started(command: list[str]) -> Iterator[Started]:
     pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    one = Started(processes.start(command, **pipes))
-    yield one
-    one.close()
+    process = Started(processes.start(command, **pipes))
+    yield process
+    process.close()
 
 
 def test_nobody_in_a_burst_is_called_silent_but_who_is(guard: Started, owners: Started) -> None:

@@ -56,4 +56,4 @@ def test_the_declared_edges_of_a_flood_are_taken_and_further_messages_skipped_me
     while reader.is_reading:
         found = reader.read(float(next(seconds)))
     assert found
-    assert [one.child for one in decode(found.received.data)] == ["odom"]
+    assert [transform.child for transform in decode(found.received.data)] == ["odom"]

@@ -94,9 +94,9 @@ class Stranger:
 @pytest.fixture
 def stranger(domain: Domain) -> Iterator[Stranger]:
     assert domain
-    one = Stranger()
-    yield one
-    one.leaves()
+    node = Stranger()
+    yield node
+    node.leaves()
 
 
 def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: RunningRobot) -> None:

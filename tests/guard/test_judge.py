@@ -242,7 +242,7 @@ def test_an_undeclared_edge_is_reported_as_the_policy_says(
     running = History(GuardPolicy(unknown_edges=policy)).clear()  # type: ignore[arg-type]
     running.repeat(running.joins("/tracker"), "map person", 10)
     assert [(finding.code, finding.severity) for finding in running.found()] == [
-        ("TF803", one) for one in severities
+        ("TF803", severity) for severity in severities
     ]
 
 
@@ -309,7 +309,7 @@ def test_of_who_has_new_frames_again_and_again_is_reported_ever_more_rarely_and_
     running.wait(130)
     for texts in (running.reports(), running.over()):
         assert len(texts) < 20
-        counted = [re.search(r"and (\d+) more", one) for one in texts]
+        counted = [re.search(r"and (\d+) more", text) for text in texts]
         assert sum(1 + int(more[1]) if more else 1 for more in counted) == 600
     findings = [event.found for event in running.events if isinstance(event, FindingShown)]
     assert "child: 'tag_*'}" in (findings[-1].help or "")

@@ -71,18 +71,22 @@ def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: Hist
     drive.node = "/drive"
     running.repeat(drive, names, 10)
     assert len(running.judge.live.tracks) == 1
-    assert [len(one.children) for one in running.all(Live) if isinstance(one, Live)] == [99]
+    assert [len(event.children) for event in running.all(Live) if isinstance(event, Live)] == [99]
 
 
 def test_each_edge_has_its_publisher_rate_age_and_delay_and_none_before_it_came() -> None:
-    rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
+    rated = tuple(
+        replace(planned, rate=10.0) if planned.owner == "slam" else planned for planned in EDGES
+    )
     running = History(edges=rated).clear()
     slam, static = running.joins("/slam"), running.joins("/static", static=True)
     running.send(static, FIXED)
     for _ in range(30):
         running.send(slam, "map odom", stamp_s=wall(running) - 0.25).wait(0.1)
     running.wait(0.2)
-    health = {one.edge.child: one for one in running.judge.health(running.now)}
+    health = {
+        edge_health.edge.child: edge_health for edge_health in running.judge.health(running.now)
+    }
     odom = health["odom"]
     assert odom.publisher == "/slam"
     assert odom.rate is not None

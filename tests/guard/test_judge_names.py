@@ -75,7 +75,9 @@ def test_a_publisher_that_sends_once_and_leaves_is_named(running: History) -> No
 def test_two_publishers_of_one_name_that_alternate_are_reported_and_the_edge_is_not_silent() -> (
     None
 ):
-    rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
+    rated = tuple(
+        replace(planned, rate=10.0) if planned.owner == "slam" else planned for planned in EDGES
+    )
     running = History()
     running.judge = Judge(
         Plan("r", "0", "base", RosSettings(), rated, PROCESSES),
@@ -189,7 +191,7 @@ def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_st
         running.send(again, "map odom").send(drive, "odom base").wait(0.1)
     assert running.reports() == []
     assert {
-        child for one in running.all(Live) if isinstance(one, Live) for child in one.children
+        child for event in running.all(Live) if isinstance(event, Live) for child in event.children
     } >= {"odom", "base"}
 
 
@@ -239,8 +241,8 @@ def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
         running.send(other, edges).wait(0.1)
         assert running.admitted == frozenset(), "the other's do not"
     found = [event for event in running.events if isinstance(event, FindingShown)]
-    assert {one.found.code for one in found} == {"TF801"}
-    assert {one.process for one in found} == ({"joints"} if process == "joints" else {""})
+    assert {event.found.code for event in found} == {"TF801"}
+    assert {event.process for event in found} == ({"joints"} if process == "joints" else {""})
     expect(found[0].found, "TF801", f"another {node}")
 
 
@@ -334,14 +336,14 @@ def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_s
         (False, "slam"),
     ):
         gid = b"1" * 16 if fenced is False and process else bytes([7]) * 16
-        one = Publisher(
+        publisher = Publisher(
             gid, "/slam", static=False, ours=bool(process), process=process, fenced=fenced
         )
-        running.events += running.judge.graph([one], running.now)
+        running.events += running.judge.graph([publisher], running.now)
     assert not left(), "what it sends may be judged first"
     for _ in range(2):
         running.now += 1.0
-        running.events += running.judge.graph([one], running.now)
+        running.events += running.judge.graph([publisher], running.now)
     (found,) = left()
     assert (found.found.code, found.process) == ("TF852", "slam")
 
@@ -356,7 +358,7 @@ def test_a_process_whose_environment_was_cleared_is_reported_by_its_number(
         running.now += 1.0
         running.events += running.judge.graph([publisher], running.now)
     found = [event for event in running.events if isinstance(event, Unfenced)]
-    assert [(one.found.code, one.process, one.pid) for one in found] == (
+    assert [(event.found.code, event.process, event.pid) for event in found] == (
         [("TF852", "", 77)] if fenced is False else []
     )
 
@@ -367,7 +369,9 @@ def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped
     slam.ours, slam.process, slam.fenced = True, "slam", True
     renamed.ours, renamed.process, renamed.fenced = True, "drive", False
     running.check().send(slam, "map odom").send(renamed, "map odom").check()
-    found = [one.found.code for one in running.events if isinstance(one, (FindingShown, Unfenced))]
+    found = [
+        event.found.code for event in running.events if isinstance(event, (FindingShown, Unfenced))
+    ]
     assert found == ["TF801", "TF852"]
 
 
@@ -412,7 +416,7 @@ def test_what_another_robot_publishes_is_one_finding_that_names_it_and_the_ways_
             slam, "map odom, odom cart"
         ).wait(0.1)
     findings = running.found()
-    assert {one.code for one in findings} == {"TF854"}
+    assert {finding.code for finding in findings} == {"TF854"}
     assert len(findings) <= 2, "a warning of its own frames, and an error of those that both have"
     expect(
         findings[-1],
@@ -436,7 +440,9 @@ def test_another_robot_with_frames_of_its_own_is_warned_of_and_keeps_nobody_from
     wheels.run = OTHER
     running.repeat(wheels, "cart left_wheel, cart right_wheel", 20)
     assert Clear() in running.events
-    assert [(one.code, one.severity) for one in running.found()] == [("TF854", "warning")]
+    assert [(finding.code, finding.severity) for finding in running.found()] == [
+        ("TF854", "warning")
+    ]
 
 
 def test_another_robot_that_has_an_edge_of_the_plan_keeps_it_from_starting() -> None:

@@ -49,9 +49,9 @@ def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop
 def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(
     running: History,
 ) -> None:
-    one, other = running.joins("/one"), running.joins("/other")
+    first, other = running.joins("/one"), running.joins("/other")
     for _ in range(5):
-        running.send(one, "base cup").send(other, "cup map").wait(0.1)
+        running.send(first, "base cup").send(other, "cup map").wait(0.1)
     loop = next(finding.message for finding in running.found() if finding.code == "TF820")
     assert loop.endswith("cup → map from /other")
     assert "the frames map → odom → base → cup → map" in next(
@@ -70,16 +70,16 @@ def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_ar
 
 
 def test_an_edge_that_others_stopped_sending_closes_no_loop_any_more(running: History) -> None:
-    one = running.joins("/one")
-    running.repeat(one, "base cup", 3).leaves(one)
+    first = running.joins("/one")
+    running.repeat(first, "base cup", 3).leaves(first)
     running.wait(12).repeat(running.joins("/other"), "cup map", 3)
     assert [reports[:5] for reports in running.reports()] == ["TF803", "TF803"]
 
 
 def test_a_stranger_that_sends_for_long_closes_a_loop_all_the_same(running: History) -> None:
-    one = running.joins("/one")
-    running.repeat(one, "base cup", 200)
-    running.send(running.joins("/other"), "cup map").send(one, "base cup").wait(0.2)
+    first = running.joins("/one")
+    running.repeat(first, "base cup", 200)
+    running.send(running.joins("/other"), "cup map").send(first, "base cup").wait(0.2)
     assert "TF820" in [reports[:5] for reports in running.reports()]
 
 
@@ -155,7 +155,7 @@ def test_where_a_publisher_runs_is_a_note(running: History) -> None:
 
 def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> None:
     running = History(
-        processes=tuple(replace(one, nodes=(f"/{one.name}",)) for one in PROCESSES)
+        processes=tuple(replace(process, nodes=(f"/{process.name}",)) for process in PROCESSES)
     ).clear()
     running.repeat(running.joins("/slam", process="slam"), "odom base", 3)
     running.repeat(running.joins("/rogue", process=""), "base lidar", 3)
@@ -188,9 +188,12 @@ def test_a_guard_that_goes_on_knows_the_processes_that_another_plan_adds() -> No
 def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_out(
     edges: str, advice: str
 ) -> None:
-    slam = next(one for one in PROCESSES if one.name == "slam")
+    slam = next(process for process in PROCESSES if process.name == "slam")
     history = History(
-        processes=(*(one for one in PROCESSES if one != slam), replace(slam, nodes=("/mapper",)))
+        processes=(
+            *(process for process in PROCESSES if process != slam),
+            replace(slam, nodes=("/mapper",)),
+        )
     ).clear()
     history.repeat(history.joins("/mapper"), edges, 5).repeat(history.joins("/rogue"), edges, 5)
     own, stranger = history.found()
@@ -214,11 +217,11 @@ def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_jud
     running.send(slam, "map odom")
     assert running.admitted is None
     running.wait(1)
-    codes = [one.code for one in running.found()]
+    codes = [finding.code for finding in running.found()]
     assert codes.count("TF853") == 1
     assert "TF801" in codes, "the declared edge in the flood"
     expect(
-        next(one for one in running.found() if one.code == "TF853"),
+        next(finding for finding in running.found() if finding.code == "TF853"),
         "TF853",
         "/rogue",
         "3,000 frames",
@@ -241,7 +244,7 @@ def test_a_flood_is_reported_with_how_much_and_how_often() -> None:
         running.judge.report_flood(rogue.gid, 10_000, running.now)
         running.wait(0.05)
     expect(
-        next(one for one in running.found() if one.code == "TF853"),
+        next(finding for finding in running.found() if finding.code == "TF853"),
         "TF853",
         "/rogue",
         "10,000 frames",
@@ -258,10 +261,10 @@ def test_others_are_judged_during_a_flood_and_what_is_allowed_passes() -> None:
     running.send(tracker, "map person_1").send(tracker, "map person_2, map cup").wait(1)
     assert running.admitted == frozenset({("map", "person_2")})
     found = [
-        (one.code, word)
-        for one in running.found()
+        (finding.code, word)
+        for finding in running.found()
         for word in ("/rogue", "/tracker")
-        if word in one.message
+        if word in finding.message
     ]
     assert sorted(set(found)) == [("TF803", "/rogue"), ("TF803", "/tracker"), ("TF853", "/rogue")]
 
@@ -275,7 +278,7 @@ def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:
     assert len(running.judge.ledger.entries) <= MOST_UNDECLARED + len(EDGES) + 500
     judged = running.judge.ledger._judged
     assert sum(len(edges) for _, _, edges in judged) <= MOST_VERDICT_EDGES
-    assert [one.code for one in running.found()].count("TF853") == 1
+    assert [finding.code for finding in running.found()].count("TF853") == 1
 
 
 def test_the_cost_of_a_chain_grows_with_its_edges_and_not_faster() -> None:

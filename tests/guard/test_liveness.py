@@ -86,7 +86,7 @@ class History:
 @pytest.fixture
 def watch() -> Callable[..., History]:
     def make(*edges: PlanEdge) -> History:
-        owners = dict.fromkeys(one.owner for one in edges)
+        owners = dict.fromkeys(planned.owner for planned in edges)
         processes = tuple(PlanProcess(owner, "external") for owner in owners)
         return History(Liveness(Plan("rover", "0", None, RosSettings(), edges, processes)))
 

@@ -44,7 +44,7 @@ class Watch:
         return self
 
     def codes(self) -> list[str]:
-        return [one.found.code for one in self.events if isinstance(one, FindingShown)]
+        return [event.found.code for event in self.events if isinstance(event, FindingShown)]
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_nobody_is_silent_or_slow_while_the_guard_loses_messages(watch: Watch) -
         watch.run(0.1, "base", lost=2).run(3, "base")
         watch.run(0.1, *["tool"] * 31, "base").run(1, "base", "tool")
     assert watch.codes() == ["TF862"]
-    rates = [one.rate for one in watch.judge.health(watch.now)]
+    rates = [health.rate for health in watch.judge.health(watch.now)]
     assert rates == [pytest.approx(HERTZ, rel=0.1)] * 2
 
 
@@ -70,10 +70,10 @@ def test_an_owner_that_is_silent_after_that_is_named_within_2_s_of_the_resending
 
 def test_a_loss_is_reported_once_and_when_it_is_over(watch: Watch) -> None:
     watch.run(3, "base", "tool", lost=7)
-    assert [one.code for one in watch.watch.wrong()] == ["TF862"]
+    assert [finding.code for finding in watch.watch.wrong()] == ["TF862"]
     watch.run(OVER_S + 1, "base", "tool")
     assert watch.watch.wrong() == []
-    assert sum(isinstance(one, RecoveredShown) for one in watch.events) == 1
+    assert sum(isinstance(event, RecoveredShown) for event in watch.events) == 1
     assert watch.codes() == ["TF862"]
 
 

@@ -81,8 +81,8 @@ LINK = {"socket": ("down", "up"), "path": ("nomaster", "master br0")}
 def computers(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Computers]:
     """Two computers, each of which runs its share of the robot."""
     with Computers(tmp_path, ("brain", "rear")) as both:
-        for name, one in both.computers.items():
-            (one.home / "robot.yaml").write_text(ROBOT.replace("MODE", request.param))
+        for name, computer in both.computers.items():
+            (computer.home / "robot.yaml").write_text(ROBOT.replace("MODE", request.param))
             assert up(both, name).returncode == 0
         assert until(lambda: not wrong(both))
         yield both

@@ -63,17 +63,17 @@ class Bus:
     def latched(self, topic: str = TOPICS[1]) -> list[set[tuple[str, str]]]:
         """Return the edges of the newest message of each latched publisher on the topic."""
         return [
-            edges_of(one.sent[-1])
-            for one in self.senders
-            if one.static and one.topic == topic and one.sent
+            edges_of(sender.sent[-1])
+            for sender in self.senders
+            if sender.static and sender.topic == topic and sender.sent
         ]
 
     def moving(self, topic: str = TOPICS[0]) -> list[set[tuple[str, str]]]:
         return [
             edges_of(data)
-            for one in self.senders
-            if not one.static and one.topic == topic
-            for data in one.sent
+            for sender in self.senders
+            if not sender.static and sender.topic == topic
+            for data in sender.sent
         ]
 
 
@@ -83,7 +83,7 @@ def _senders_that_remember(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def edges_of(data: bytes) -> set[tuple[str, str]]:
-    return {(one.parent, one.child) for one in decode(data)}
+    return {(transform.parent, transform.child) for transform in decode(data)}
 
 
 def pairs(edges: str) -> tuple[tuple[str, str], ...]:
@@ -263,6 +263,6 @@ def test_a_burst_of_more_publishers_than_tf2_keeps_messages_is_kept_for_slow_lis
     passing = Passing({"slam": ("/slam/tf", "/slam/tf_static")})
     passing.bus.listeners = {"/slam/tf": 2, "/slam/tf_static": 2}
     passing.observe()
-    depths = {(one.topic, one.depth) for one in passing.bus.senders}
+    depths = {(sender.topic, sender.depth) for sender in passing.bus.senders}
     assert depths == {("/tf", relay.KEPT), ("/slam/tf", relay.KEPT), ("/slam/tf_static", None)}
     assert relay.KEPT >= 2 * 200

@@ -144,16 +144,24 @@ class Listener:
         end = time.monotonic() + seconds
         while time.monotonic() < end and not (enough and enough(received)):
             wait(self.node, self.readers, 0.1, Stop())  # type: ignore[arg-type]
-            received += [one for reader in self.readers for one in reader.take()]
+            received += [message for reader in self.readers for message in reader.take()]
         return received
 
 
 def children(received: list[Received]) -> set[str]:
-    return {transform.child for one in received for transform in decode(one.data)}
+    return {
+        transform.child
+        for received_message in received
+        for transform in decode(received_message.data)
+    }
 
 
 def of_the_base(received: list[Received]) -> set[str]:
-    return {one.data.hex() for one in received if children([one]) == {"base_link"}}
+    return {
+        received_message.data.hex()
+        for received_message in received
+        if children([received_message]) == {"base_link"}
+    }
 
 
 def reported(robot: Fenced) -> list[str]:
@@ -175,18 +183,29 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
 
         def named() -> bool:
             names.update(
-                (one.gid, one.node)
+                (writer.gid, writer.node)
                 for topic in ("/tf", "/tf_static")
-                for one in writers(node, topic)
+                for writer in writers(node, topic)
             )
-            return all(names.get(one.gid) == "/tfcompose_guard" for one in received if one.gid)
+            return all(
+                names.get(received_message.gid) == "/tfcompose_guard"
+                for received_message in received
+                if received_message.gid
+            )
 
         assert until(named), names
     assert children(received) == FRAMES
-    poses = {t.xyz for one in received for t in decode(one.data) if t.child in {"odom", "laser"}}
+    poses = {
+        t.xyz
+        for received_message in received
+        for t in decode(received_message.data)
+        if t.child in {"odom", "laser"}
+    }
     assert (0.1, 0.2, 0.3) not in poses, "the rogue's edge got through"
-    fixed = [one for one in received if children([one]) <= FIXED]
-    assert sorted(map(len, map(decode, (one.data for one in fixed)))) == [
+    fixed = [
+        received_message for received_message in received if children([received_message]) <= FIXED
+    ]
+    assert sorted(map(len, map(decode, (message.data for message in fixed)))) == [
         1,
         2,
     ], "each sender's edges in one message"
@@ -230,7 +249,9 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
 
         assert until(is_back), robot.text  # it waits a second, and then needs some time to listen
         began_ns = robot.child("guard").create_time() * 1e9
-        assert [one for one in meanwhile if died_ns < one.source_ns < began_ns] == []
+        assert [
+            received for received in meanwhile if died_ns < received.source_ns < began_ns
+        ] == []
         joined = Listener(other)
         robot.says("warning[TF808]", "guard", "SIGKILL", "/tf")
         robot.says("over", "guard")
@@ -293,7 +314,7 @@ def heard_by(up: Started) -> dict[str, int]:
     return found
 
 
-def one(parent: str, child: str) -> bytes:
+def encoded(parent: str, child: str) -> bytes:
     return encode(
         [SentTransform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]
     )
@@ -310,14 +331,14 @@ def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_la
     up = start("up", tmp_path / "robot.yaml")
     with open_node("outside", "/test") as node:
         fixed, moving = TFPublisher(node, static=True), TFPublisher(node, static=False)
-        fixed.publish(one("odom", "dock"))
+        fixed.publish(encoded("odom", "dock"))
         up.until_says("tree complete")
         sent = 0
 
         def send() -> bool:
             nonlocal sent
             sent += 1
-            moving.publish(one("odom", "dock_2"))
+            moving.publish(encoded("odom", "dock_2"))
             return until(lambda: "dock_2" in heard_by(up), 0.05)
 
         assert until(send), up.output
@@ -329,4 +350,4 @@ def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_la
         assert until(lambda: heard_by(up).keys() >= full), up.output
         assert heard_by(up)["ear"] == 1
         known = {"/tfcompose_guard", "/test/outside"}
-        assert until(lambda: {one.node for one in writers(node, "/tf_static")} == known)
+        assert until(lambda: {writer.node for writer in writers(node, "/tf_static")} == known)

@@ -47,21 +47,21 @@ def test_a_parameter_is_reported_exactly_where_it_is_another_value(
     wanted: Value, found: Value | None, *, reported: bool
 ) -> None:
     wrong = not_taken("/front/front", {"switch": wanted}, {"switch": found}, DRIVEN)
-    assert [one.code for one in wrong] == ["TF829"] * reported
+    assert [finding.code for finding in wrong] == ["TF829"] * reported
 
 
 def test_the_finding_names_the_node_the_parameter_and_both_values() -> None:
-    (one,) = not_taken("/front/front", {"publish_tf": False}, {"publish_tf": True}, DRIVEN)
+    (first,) = not_taken("/front/front", {"publish_tf": False}, {"publish_tf": True}, DRIVEN)
     expect(
-        one,
+        first,
         "TF829",
         "/front/front",
         "publish_tf: true",
         "publish_tf: false",
         "front (realsense/d455)",
     )
-    (one,) = not_taken("/drive", {"enable_odom_tf": False}, {"enable_odom_tf": None})
-    expect(one, "TF829", "/drive", "no parameter enable_odom_tf", "enable_odom_tf: false")
+    (first,) = not_taken("/drive", {"enable_odom_tf": False}, {"enable_odom_tf": None})
+    expect(first, "TF829", "/drive", "no parameter enable_odom_tf", "enable_odom_tf: false")
 
 
 # Guards that follow each other.
@@ -109,16 +109,16 @@ class Watch:
             self.memory.hand_on()
 
     def all(self, kind: type[Any]) -> list[Any]:
-        return [one for one in self.reported if isinstance(one, kind)]
+        return [finding for finding in self.reported if isinstance(finding, kind)]
 
 
 @pytest.fixture
 def watch(monkeypatch: pytest.MonkeyPatch) -> Watch:
-    one = Watch(Reader())
-    monkeypatch.setattr(gates, "_reader", lambda *_: one.reader)
-    monkeypatch.setattr("time.monotonic", lambda: one.now)
-    one.follow({})
-    return one
+    started = Watch(Reader())
+    monkeypatch.setattr(gates, "_reader", lambda *_: started.reader)
+    monkeypatch.setattr("time.monotonic", lambda: started.now)
+    started.follow({})
+    return started
 
 
 @pytest.fixture
@@ -127,8 +127,8 @@ def left(watch: Watch, tmp_path: Path) -> Callable[[], dict[str, Any]]:
 
     def read() -> dict[str, Any]:
         known: dict[str, Any] = {}
-        for one in watch.all(Remember):
-            known |= one.changed
+        for event in watch.all(Remember):
+            known |= event.changed
         (tmp_path / "memory").write_text(json.dumps(known))
         return recall_memory({MEMORY_FD: str(os.open(tmp_path / "memory", os.O_RDONLY))})
 

@@ -61,8 +61,8 @@ def test_all_is_clear_and_complete_once_the_last_judge_says_so(
     edge: Callable[..., PlanEdge],
 ) -> None:
     reports: list[GuardEvent] = []
-    one, two, none = plan(edge("a b")), plan(edge("c d"), edge("c e")), plan()
-    tell = together(reports.append, [one, two, none])
+    first, two, none = plan(edge("a b")), plan(edge("c d"), edge("c e")), plan()
+    tell = together(reports.append, [first, two, none])
     for event in (Clear(), Clear(), OwnerReady("static"), TreeComplete(0), TreeComplete(1)):
         tell(event)
     assert reports == [OwnerReady("static")]

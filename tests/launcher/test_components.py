@@ -54,7 +54,7 @@ def component(name: str, **more: Any) -> PlanProcess:
 def loaded(*components: PlanProcess, box: PlanProcess = BOX) -> History:
     """Return a history in which the container has loaded all of them."""
     history = begin(GUARD, box, *components).feed(Clear(), GateState("box", "there", is_open=True))
-    return history.answer(*(one.name for one in components))
+    return history.answer(*(process.name for process in components))
 
 
 def test_components_are_loaded_in_the_plans_order_once_their_container_is_ready() -> None:
@@ -189,7 +189,7 @@ def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() ->
     )
     history.answer("b")
     history.feed(DownRequest())
-    assert not any(one.do == "unload" for one in history.requested)
+    assert not any(request.do == "unload" for request in history.requested)
     assert history.killed == [("box", SIGINT)]
     assert history.feed(Exited("box", 0), Exited("guard", 0)).exit_code == 0
 
@@ -244,10 +244,11 @@ def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -
 def test_a_changed_component_is_unloaded_and_loaded_and_one_that_vanished_is_unloaded() -> None:
     history = loaded(component("a"), component("b"))
     plan = replace(
-        history.plan, processes=tuple(one for one in history.plan.processes if one.name != "b")
+        history.plan,
+        processes=tuple(process for process in history.plan.processes if process.name != "b"),
     )
     history.feed(NewPlan(plan, frozenset({"a"})))
-    assert [(one.do, one.process) for one in history.requested[2:]] == [
+    assert [(request.do, request.process) for request in history.requested[2:]] == [
         ("unload", "b"),
         ("unload", "a"),
     ]
@@ -316,6 +317,6 @@ def test_a_guard_that_follows_another_hears_of_an_owner_before_it_is_to_load_it(
         step(history.state, Tick(), history.now + 0.1)[0], Started("guard", 9), history.now + 0.1
     )[1]
     assert Start("guard") in actions
-    orders = [one.order if isinstance(one, Order) else one for one in again]
-    load = next(one for one in orders if isinstance(one, ComponentOrder))
+    orders = [request.order if isinstance(request, Order) else request for request in again]
+    load = next(order for order in orders if isinstance(order, ComponentOrder))
     assert orders.index(load) > orders.index(Present("a")) > orders.index(Absent("a"))

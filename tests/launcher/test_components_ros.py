@@ -140,7 +140,11 @@ def found(notices: list[Notice]) -> list[Finding]:
 
 
 def states(notices: list[Notice], name: str) -> list[str]:
-    return [one.state for one in notices if isinstance(one, ProcessState) and one.process == name]
+    return [
+        notice.state
+        for notice in notices
+        if isinstance(notice, ProcessState) and notice.process == name
+    ]
 
 
 def are_ready(notices: list[Notice]) -> bool:
@@ -148,7 +152,7 @@ def are_ready(notices: list[Notice]) -> bool:
 
 
 def has_found(code: str) -> Step:
-    return lambda notices: any(one.code == code for one in found(notices))
+    return lambda notices: any(finding.code == code for finding in found(notices))
 
 
 @pytest.mark.usefixtures("domain")
@@ -165,7 +169,7 @@ def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_e
 
     def steal(notices: list[Notice]) -> bool:
         is_back = (
-            sum(isinstance(one, TreeComplete) for one in notices) == 2
+            sum(isinstance(notice, TreeComplete) for notice in notices) == 2
             and states(notices, "rectify")[-1] == "running"
         )
         if is_back:
@@ -183,8 +187,10 @@ def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_e
     for name in ("rectify", "odometry"):
         assert states(notices, name) == ["starting", "running", "stopped", "starting", "running"]
     first, second = requested(stand_in)[:2], requested(stand_in)[2:]
-    assert [one | {"pid": 0} for one in second] == [one | {"pid": 0} for one in first]
-    assert {one["pid"] for one in first}.isdisjoint(one["pid"] for one in second)
+    assert [request | {"pid": 0} for request in second] == [
+        request | {"pid": 0} for request in first
+    ]
+    assert {request["pid"] for request in first}.isdisjoint(request["pid"] for request in second)
     rectify, odometry = first
     assert rectify["node"] == "/robot1/front/rectify"
     assert rectify["plugin"] == "image_proc/demo::Empty"
@@ -203,7 +209,11 @@ def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_e
         name: (type(value), value) for name, value in params.items()
     }
     assert odometry["node"] == "/robot1/odometry"
-    lines = {one.process for one in notices if isinstance(one, LogLine) and "is up" in one.text}
+    lines = {
+        notice.process
+        for notice in notices
+        if isinstance(notice, LogLine) and "is up" in notice.text
+    }
     assert lines == {"rectify", "odometry"}, "what a component logs is its own"
 
 
@@ -243,7 +253,10 @@ def test_components_are_unloaded_from_a_container_that_is_external(
     tmp_path: Path, theirs: Path
 ) -> None:
     notices = run(tmp_path, EXTERNAL, are_ready)
-    assert [one["unloaded"] for one in requested(theirs) if "unloaded" in one] == [2, 1]
+    assert [request["unloaded"] for request in requested(theirs) if "unloaded" in request] == [
+        2,
+        1,
+    ]
     assert found(notices) == []
 
 
@@ -296,7 +309,7 @@ def test_without_a_launcher_the_guard_loads_also_into_a_container_that_was_start
         assert until(partial(has_requests, stand_in, count))
         box.kill()
         box.wait()
-    nodes = [one["node"] for one in requested(stand_in)]
+    nodes = [request["node"] for request in requested(stand_in)]
     assert nodes == ["/robot1/front/rectify", "/robot1/odometry"] * 2
 
 

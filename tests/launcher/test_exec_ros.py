@@ -64,7 +64,7 @@ def test_what_cannot_be_started_is_reported(
         .replace('["sh", ', '["no-such-program", ')
     )
     plan.write_text(text, "utf-8")
-    one = start("exec", plan, name)
-    assert one.process.wait(60) == code
-    assert until(lambda: shown in "".join(one.errors)), one.errors
-    assert "Traceback" not in "".join(one.errors)
+    run = start("exec", plan, name)
+    assert run.process.wait(60) == code
+    assert until(lambda: shown in "".join(run.errors)), run.errors
+    assert "Traceback" not in "".join(run.errors)

@@ -279,7 +279,7 @@ def test_what_left_its_group_and_its_environment_ends_with_the_run(
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
     assert until(lambda: run.ps()["bare"].state == ("running" if parent == "stays" else "exited"))
-    assert pid not in {one.pid for one in leftovers(f"{NAME}:")}
+    assert pid not in {leftover.pid for leftover in leftovers(f"{NAME}:")}
     if how == "is killed":
         run.search()
         run.popen.kill()
@@ -302,10 +302,10 @@ def test_a_child_holder_that_is_killed_is_replaced(
 
 
 def holder_of(run: Run) -> psutil.Process | None:
-    for one in psutil.Process(run.popen.pid).children():
+    for child in psutil.Process(run.popen.pid).children():
         with contextlib.suppress(psutil.NoSuchProcess):  # another one may just end
-            if one.name() == "sh":
-                return one
+            if child.name() == "sh":
+                return child
     return None
 
 
@@ -315,15 +315,15 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
-    assert {one.launcher for one in leftovers(f"{NAME}:")} == {run.popen.pid}
+    assert {leftover.launcher for leftover in leftovers(f"{NAME}:")} == {run.popen.pid}
     run.popen.send_signal(signal.SIGSTOP)  # it shall not get another keeper
     child_holder = holder_of(run)
     assert child_holder
     child_holder.kill()
     run.popen.kill()
     run.popen.wait()
-    assert until(lambda: [one.pid for one in leftovers(f"{NAME}:")] == [pid])
-    assert [one.launcher for one in leftovers(f"{NAME}:")] == [None]
+    assert until(lambda: [leftover.pid for leftover in leftovers(f"{NAME}:")] == [pid])
+    assert [leftover.launcher for leftover in leftovers(f"{NAME}:")] == [None]
     assert leftovers(f"{NAME}1:") == []
     assert end(leftovers(f"{NAME}:"), 0.3) == []
     assert gone(pid)

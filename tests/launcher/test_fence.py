@@ -45,14 +45,14 @@ def plan_of(*processes: PlanProcess, fence: FenceWay = "auto") -> Plan:
             parent,
             child,
             "dynamic",
-            one.name,
-            f"/{one.name}",
+            process.name,
+            f"/{process.name}",
             Pose(),
             None,
             SourceLine("rover.yaml", 1),
         )
-        for one in processes
-        for parent, child in one.owns
+        for process in processes
+        for parent, child in process.owns
     )
     return Plan(
         "rover", "", None, RosSettings(), edges, processes, GuardPolicy("strict", fence=fence)
@@ -73,11 +73,11 @@ def partitions(command: ChildCommand) -> dict[tuple[str, str], str]:
     root = ET.fromstring(command.fence[1])  # noqa: S314 (made here)
     name = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
     return {
-        (one.tag.removeprefix(name), one.attrib["profile_name"]): (
-            one.findtext(f".//{name}value") or ""
+        (element.tag.removeprefix(name), element.attrib["profile_name"]): (
+            element.findtext(f".//{name}value") or ""
         )
-        for one in root.iter()
-        if one.tag.startswith(f"{name}data_")
+        for element in root.iter()
+        if element.tag.startswith(f"{name}data_")
     }
 
 
@@ -128,8 +128,8 @@ def participant_properties(command: ChildCommand) -> dict[str | None, str | None
     path = "participant[@is_default_profile='true']/rtps/propertiesPolicy/properties/property"
     path = "/".join(f"{NAMESPACE}{step}" for step in path.split("/"))
     return {
-        one.findtext(f"{NAMESPACE}name"): one.findtext(f"{NAMESPACE}value")
-        for one in root.findall(f".//{path}")
+        element.findtext(f"{NAMESPACE}name"): element.findtext(f"{NAMESPACE}value")
+        for element in root.findall(f".//{path}")
     }
 
 
@@ -203,13 +203,18 @@ def test_the_fence_is_merged_into_a_users_own_profiles(tmp_path: Path) -> None:
     name = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
     root = ET.fromstring(text)  # noqa: S314 (made here)
     writers = {
-        one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}data_writer"
+        element.attrib["profile_name"]: element
+        for element in root.iter()
+        if element.tag == f"{name}data_writer"
     }
     writers |= {
-        one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}publisher"
+        element.attrib["profile_name"]: element
+        for element in root.iter()
+        if element.tag == f"{name}publisher"
     }
     values = {
-        topic: [value.text for value in one.iter(f"{name}value")] for topic, one in writers.items()
+        topic: [value.text for value in writer.iter(f"{name}value")]
+        for topic, writer in writers.items()
     }
     assert values == {
         "all": [],
@@ -220,7 +225,9 @@ def test_the_fence_is_merged_into_a_users_own_profiles(tmp_path: Path) -> None:
     assert writers["/tf"].findtext(f"{name}historyMemoryPolicy") == "DYNAMIC", (
         "what holds for all writers"
     )
-    assert [topic for topic, one in writers.items() if one.get("is_default_profile")] == ["all"]
+    assert [topic for topic, writer in writers.items() if writer.get("is_default_profile")] == [
+        "all"
+    ]
     assert writers["/scan"].findtext(f"{name}userDefinedID") == "7"
     assert "tfc_rover" in (commands["guard"].fence or ("", ""))[1]
 

@@ -92,14 +92,14 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
             parent,
             child,
             "dynamic",
-            one.name,
-            one.nodes[0],
+            process.name,
+            process.nodes[0],
             Pose(),
             None,
             SourceLine("robot.yaml", 1),
         )
-        for one in processes
-        for parent, child in one.owns
+        for process in processes
+        for parent, child in process.owns
     )
     plan = Plan("rover", "", None, RosSettings(), edges, (*processes, GUARD))
     file = tmp_path / "plan.json"
@@ -109,7 +109,9 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
     def report(notice: Notice) -> None:
         notices.append(notice)
         shut = [
-            one for one in notices if isinstance(one, FindingShown) and one.found.code == "TF817"
+            shown
+            for shown in notices
+            if isinstance(shown, FindingShown) and shown.found.code == "TF817"
         ]
         if isinstance(notice, AllReady) or (late and len(shut) == late):
             raise BrokenPipeError  # enough was seen
@@ -121,7 +123,7 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
 def late_of(notices: list[Notice]) -> dict[str, Finding]:
     """Return what was shown, by the process that is not ready."""
     findings = [notice.found for notice in notices if isinstance(notice, FindingShown)]
-    return {one.message.split()[0]: one for one in findings}
+    return {finding.message.split()[0]: finding for finding in findings}
 
 
 @pytest.mark.usefixtures("domain")

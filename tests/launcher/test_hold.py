@@ -126,22 +126,22 @@ def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_st
     kinds = [notice for _, notice in notices]
     started = next(
         i
-        for i, one in enumerate(kinds)
-        if isinstance(one, ProcessState) and one.process == "static"
+        for i, kind in enumerate(kinds)
+        if isinstance(kind, ProcessState) and kind.process == "static"
     )
-    output = [one.text if isinstance(one, LogLine) else "" for one in kinds]
+    output = [kind.text if isinstance(kind, LogLine) else "" for kind in kinds]
     loaded = next(i for i, text in enumerate(output) if text.endswith("loaded"))
     assert loaded < started < output.index("went on")
     pids = {
-        one.pid
-        for one in kinds
-        if isinstance(one, ProcessState) and one.process == "static" and one.pid
+        kind.pid
+        for kind in kinds
+        if isinstance(kind, ProcessState) and kind.process == "static" and kind.pid
     }
     assert pids == {int(output[loaded].split()[1])}
     others = [
         i
-        for i, one in enumerate(kinds)
-        if isinstance(one, ProcessState) and one.process == "other"
+        for i, kind in enumerate(kinds)
+        if isinstance(kind, ProcessState) and kind.process == "other"
     ]
     assert others[0] > loaded
 
@@ -166,7 +166,9 @@ def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: 
     plan = plan_of(observing_until("dies"), dies)
     assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
     states = [
-        one.state for one in notices if isinstance(one, ProcessState) and one.process == "static"
+        notice.state
+        for notice in notices
+        if isinstance(notice, ProcessState) and notice.process == "static"
     ]
     assert states == ["starting", "running", "exited"]
     assert not psutil.Process().children(recursive=True)
@@ -185,7 +187,9 @@ def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(
     )
     assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
     assert {
-        one.process for one in notices if isinstance(one, ProcessState) and one.state == "exited"
+        notice.process
+        for notice in notices
+        if isinstance(notice, ProcessState) and notice.state == "exited"
     } == {"guard"}
     assert not psutil.Process().children(recursive=True)
 

@@ -221,5 +221,6 @@ def test_the_keys_reach_the_plan() -> None:
 )
 def test_wrong_keys_are_findings(keys: str, code: str) -> None:
     assert [
-        one.code for one in compile_robot(ROBOT % ("run: [x]", keys), "r.yaml", library()).errors
+        finding.code
+        for finding in compile_robot(ROBOT % ("run: [x]", keys), "r.yaml", library()).errors
     ] == [code]

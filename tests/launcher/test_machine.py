@@ -221,7 +221,11 @@ def test_a_required_program_that_others_wait_for_until_it_is_done_may_end_with_0
     for spawner, others in zip(spawners, ((drive,), ()), strict=True):
         history = begin(spawner, STATIC, *others).feed(Exited("spawner", 0))
         assert (history.found(), history.exit_code) == ([], None)
-        assert history.started == ["spawner", "static", *(one.name for one in others)]
+        assert history.started == [
+            "spawner",
+            "static",
+            *(other_process.name for other_process in others),
+        ]
     for code, others in ((0, ()), (1, (drive,))):
         history = begin(spawners[0], STATIC, *others).feed(Exited("spawner", code))
         expect(history.only(), "TF808", "spawner", f"exit code {code}")
@@ -386,7 +390,7 @@ def test_a_violation_is_only_shown_where_the_policy_is_report() -> None:
 def test_missing_edges_are_named_after_5_s_and_again_only_when_there_are_others() -> None:
     history = begin(GUARD, STATIC, SLAM).wait(3).feed(Clear())
     assert history.sleep_until_due() == pytest.approx(5)
-    assert [[one.owner for one in notice.missing] for notice in history.all(Waiting)] == [
+    assert [[gap.owner for gap in notice.missing] for notice in history.all(Waiting)] == [
         ["static", "slam"]
     ]
     assert wake_time(history.state) is None

@@ -82,7 +82,7 @@ def test_ready_does_not_wait_for_it_nor_for_its_edges_and_says_what_is_left_out(
     assert ready.without == ("camera",)
     assert [row.process for row in ready.rows] == ["guard", "static"]
     assert history.all(Waiting) == []
-    assert (history.state.complete, [one.child for one in history.state.missing]) == (
+    assert (history.state.complete, [edge.child for edge in history.state.missing]) == (
         False,
         ["camera"],
     )
@@ -91,7 +91,7 @@ def test_ready_does_not_wait_for_it_nor_for_its_edges_and_says_what_is_left_out(
 def test_what_else_is_missing_is_still_waited_for() -> None:
     history = begin(GUARD, STATIC, optional()).feed(Clear(), Exited("camera", 1)).wait(6)
     assert history.all(AllReady) == []
-    assert [one.owner for one in history.all(Waiting)[0].missing] == ["static"]
+    assert [edge.owner for edge in history.all(Waiting)[0].missing] == ["static"]
 
 
 def test_who_waits_for_it_fails_and_ends_everything_unless_optional_too() -> None:
@@ -138,7 +138,7 @@ def test_it_is_started_again_on_request_and_what_waited_for_it_follows() -> None
     assert history.state.given_up == ("nav",)
     history.wait(1)
     assert history.started[-2:] == ["camera", "nav"]
-    assert not [one for one in history.state.tracked.values() if one.failed]
+    assert not [tracked for tracked in history.state.tracked.values() if tracked.failed]
 
 
 def test_after_a_signal_the_exit_code_is_0_and_after_a_time_1_with_the_failure_at_the_end() -> (
@@ -163,12 +163,12 @@ def test_an_optional_process_does_not_hold_back_that_all_is_started() -> None:
         replace(optional(), ready=Ready("log", "up")),
         optional("nav", after={"camera": "ready"}),
     )
-    assert [one.waiting for one in history.all(AllStarted)] == [("nav",)]
+    assert [event.waiting for event in history.all(AllStarted)] == [("nav",)]
 
 
 def test_ps_says_what_is_optional_why_it_ended_and_that_it_has_failed() -> None:
     history = failed(SLAM)
-    output = {one.name: one for one in status(history.state, history.now).processes}
+    output = {process.name: process for process in status(history.state, history.now).processes}
     camera = output["camera"]
     assert (camera.state, camera.detail, camera.failed) == ("exited", "exit code 3", True)
     assert (camera.required, output["slam"].required) == (False, None)
@@ -179,7 +179,7 @@ def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:
     history = begin(STATIC, nav, optional()).feed(Exited("camera", 3))
     assert history.state.given_up == ("nav", "camera")
     history.feed(TimeUp(), Exited("static", 0))
-    assert [one.because[0].split()[0] for one in history.all(Ended)] == ["camera"]
+    assert [event.because[0].split()[0] for event in history.all(Ended)] == ["camera"]
 
 
 def test_a_process_that_was_stopped_on_purpose_does_not_fail_with_what_it_waits_for() -> None:

@@ -122,7 +122,7 @@ def test_one_of_two_gets_the_lock_and_a_killed_holder_leaves_nothing(
         holder = runtime_dir.holder()
         assert holder
         assert (holder.pid, holder.run) == (other.pid, run)
-        assert [one.name for one in runtime_dirs(env)] == ["rover@7"]
+        assert [listed.name for listed in runtime_dirs(env)] == ["rover@7"]
         other.kill()
     assert runtime_dir.holder() is None
     lock = Lock(runtime_dir)

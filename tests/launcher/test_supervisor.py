@@ -278,7 +278,7 @@ def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(
     code, notices = run(tmp_path, absent, failing, lasting)
     assert (code, logged(notices, "lasting")) == (1, ["to the end"])
     findings = [notice.found for notice in notices if isinstance(notice, FindingShown)]
-    assert [one.severity for one in findings] == ["warning", "warning"]
+    assert [finding.severity for finding in findings] == ["warning", "warning"]
     expect(findings[0], findings[0].code, "no_package/no_program", "absent")
     expect(findings[1], "TF808", "failing", "exit code 3")
 
@@ -348,9 +348,10 @@ def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(
     def running_b() -> Notice | None:
         return next(
             (
-                one
-                for one in notices
-                if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "running")
+                notice
+                for notice in notices
+                if isinstance(notice, ProcessState)
+                and (notice.process, notice.state) == ("b", "running")
             ),
             None,
         )
@@ -380,7 +381,9 @@ def test_a_pattern_that_takes_for_ever_is_given_up_and_the_launcher_goes_on(
             os.kill(os.getpid(), SIGTERM)
 
     assert supervise(plan_of(slow), tmp_path / "plan.json", report=report) == 0
-    (given_up,) = (one for one in notices if isinstance(one, LogLine) and one.stream == "stderr")
+    (given_up,) = (
+        line for line in notices if isinstance(line, LogLine) and line.stream == "stderr"
+    )
     assert (given_up.process, "(a|aa)+$" in given_up.text) == ("slow", True)
 
 

@@ -33,10 +33,10 @@ def messages(kind: type) -> st.SearchStrategy[Any]:
     """Give any message of the class."""
     hints = get_type_hints(kind)
     strategies = {
-        one.name: st.dictionaries(st.text(), JSON, max_size=3)
-        if hints[one.name] == dict[str, Any]
-        else st.from_type(hints[one.name])
-        for one in msgspec.structs.fields(kind)
+        field.name: st.dictionaries(st.text(), JSON, max_size=3)
+        if hints[field.name] == dict[str, Any]
+        else st.from_type(hints[field.name])
+        for field in msgspec.structs.fields(kind)
     }
     return st.builds(kind, **strategies)
 

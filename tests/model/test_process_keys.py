@@ -83,9 +83,9 @@ def foreign_words() -> set[str]:
     for row in ROWS:
         exported = Exported(process, awaited=True)
         dialects = (row.systemd, row.compose, row.kubernetes)
-        words |= {setting.name for one in dialects for setting in one.settings(exported)}
+        words |= {setting.name for dialect in dialects for setting in dialect.settings(exported)}
         keywords = row.launch.keywords if row.launch else ()
-        words |= {word for one in keywords for word in (one.name, one.attribute)}
+        words |= {word for keyword in keywords for word in (keyword.name, keyword.attribute)}
     return {word for word in words if re.search(r"[a-z][A-Z]|[_-]", word)}
 
 
@@ -99,7 +99,7 @@ def test_a_word_of_another_system_stands_in_the_table_alone() -> None:
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_a_row_and_the_plan_have_the_same_default(row: ProcessKey) -> None:
     holder = Component if row.to == LOADED else PlanProcess
-    assert row.name in {one.name for one in fields(holder)}
+    assert row.name in {field.name for field in fields(holder)}
     unset = PlanProcess("p", "run", component=Component("c", "p", "x::Y"))
     assert not row.is_set(unset)
     assert row.default is None or row.default == row.value_of(unset)

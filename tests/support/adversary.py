@@ -131,8 +131,8 @@ class Robot(RunningRobot):
             *("processes:", "  drive: {simulate: {fixed: {}, rate: 20 Hz}}"),
             f"  slam: {{run: {json.dumps(node('slam', OWNER_X, 'map odom'))}, node: /slam}}",
         ]
-        for name, one in children.items():
-            more = {"run": one.command, "node": f"/{name}", "required": False, "restart": "no"}
+        for name, child in children.items():
+            more = {"run": child.command, "node": f"/{name}", "required": False, "restart": "no"}
             lines.append(f"  {name}: {json.dumps(more)}")
         (folder / "robot.yaml").write_text("\n".join(lines), encoding="utf-8")
         super().__init__(folder, env=self.env)
@@ -194,8 +194,8 @@ class PlainListener:
             def enough() -> bool:
                 wait(own, [reader], 0.1, Stop())
                 for received in reader.take():
-                    for one in decode(received.data):
-                        self.heard.setdefault(one.child, []).append(one.xyz[0])
+                    for transform in decode(received.data):
+                        self.heard.setdefault(transform.child, []).append(transform.xyz[0])
                 return self.heard.get(child, []).count(x) >= times
 
             assert until(enough), self.heard
@@ -218,5 +218,5 @@ def holds_back(robot: Robot, inside: Mapping[str, str], **foreign_inside: str) -
         assert "extra" not in listener.heard
         assert "listeners receive it" not in robot.output_after(after)
     finally:
-        for one in started:
-            robot.stop(one)
+        for rogue in started:
+            robot.stop(rogue)

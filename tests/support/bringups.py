@@ -58,14 +58,14 @@ def _as_read(value: Any) -> Any:
 
 def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
     """Return parameters by their full names."""
-    several: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
     for key, value in params.items():
-        several |= (
+        parameters |= (
             flat(value, f"{above}{key}.")
             if isinstance(value, dict)
             else {f"{above}{key}": _as_read(value)}
         )
-    return several
+    return parameters
 
 
 def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
@@ -75,16 +75,16 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
 
     Parameters have their types: 20.0 is not 20.
     """
-    several: dict[str, dict[str, Any]] = {}
+    programs: dict[str, dict[str, Any]] = {}
     for process in robot.processes:
         params = flat(process.ros_nodes[0].params) if process.ros_nodes else {}
         if process.component:
             (container,) = (
-                one
-                for one in robot.processes
-                if process.component and one.name == process.component.container
+                candidate
+                for candidate in robot.processes
+                if process.component and candidate.name == process.component.container
             )
-            several[process.name] = {
+            programs[process.name] = {
                 "program": f"{process.component.package}/{process.component.plugin}",
                 "container": container.node,
                 "node": process.node,
@@ -100,8 +100,8 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
             else process.launch or process.argv[0]
         )
         own = process.package or process.launch
-        same = sum(one["program"] == program for one in several.values())
-        several[f"{program} {same}" if process.launch else process.name] = {
+        same = sum(bringup["program"] == program for bringup in programs.values())
+        programs[f"{program} {same}" if process.launch else process.name] = {
             "program": program,
             "words": [
                 _PARAMETER_FILE.sub("${params_file}", word)
@@ -124,7 +124,7 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
                 else {key: repr(value) for key, value in sorted(params.items())}
             ),
         }
-    return several
+    return programs
 
 
 def places(printed: str, code: str) -> list[str]:

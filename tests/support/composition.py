@@ -114,7 +114,7 @@ def _compile(folder: Path) -> None:
     package = folder / NAME
     headers = Path(sys.prefix) / "include"
     includes = [folder, headers, *sorted(headers.iterdir()), sysconfig.get_path("include")]
-    flags = ["-O0", "-fPIC", *(f"-I{one}" for one in (*includes, np.get_include()))]
+    flags = ["-O0", "-fPIC", *(f"-I{path}" for path in (*includes, np.get_include()))]
     objects = []
     for source in [*sorted(package.rglob("*.c")), *sorted(package.rglob("*.cpp"))]:
         objects.append(f"{source}.o")

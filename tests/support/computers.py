@@ -171,7 +171,9 @@ class Computers:
                 self.computers[name] = Computer(name, f"10.77.0.{number + 2}", self.folder / name)
                 self.boot(name)
             known = (self.folder / "host_key.pub").read_text()
-            lines = [f"[{one.address}]:{self.port} {known}" for one in self.computers.values()]
+            lines = [
+                f"[{computer.address}]:{self.port} {known}" for computer in self.computers.values()
+            ]
             (self.home / ".ssh/known_hosts").write_text("".join(lines))
         except BaseException:
             self.__exit__()
@@ -180,8 +182,8 @@ class Computers:
 
     def __exit__(self, *_: object) -> None:
         """End everything on them."""
-        for one in self.computers.values():
-            one.lose_power()
+        for computer in self.computers.values():
+            computer.lose_power()
         if self.office is not None:
             self.office.kill()
             self.office.communicate()
@@ -193,14 +195,14 @@ class Computers:
 
     def boot(self, name: str) -> None:
         """Start a computer; what is enabled there is started."""
-        one = self.computers[name]
-        one.home.mkdir(parents=True, exist_ok=True)
-        config = one.folder / "sshd_config"
+        computer = self.computers[name]
+        computer.home.mkdir(parents=True, exist_ok=True)
+        config = computer.folder / "sshd_config"
         environment = " ".join(
-            f'"{variable}={value}"' for variable, value in one.environment().items()
+            f'"{variable}={value}"' for variable, value in computer.environment().items()
         )
         config.write_text(
-            f"ListenAddress {one.address}\nPort {self.port}\nHostKey"
+            f"ListenAddress {computer.address}\nPort {self.port}\nHostKey"
             f" {self.folder / 'host_key'}\nPidFile none\nAuthorizedKeysFile"
             f" {self.home / '.ssh/id_ed25519.pub'}\nStrictModes no\nUsePAM"
             f" no\nPasswordAuthentication no\nSetEnv {environment}\n"
@@ -212,14 +214,14 @@ class Computers:
         run = f"mkdir -m 700 /run/{name}"
         assert SSHD
         words = [SSHD, "-D", "-e", "-f", str(config)]
-        one.process = self._started(
-            name, f"{run}; echo linked; {until_linked.format(one.address)}", words, one
+        computer.process = self._started(
+            name, f"{run}; echo linked; {until_linked.format(computer.address)}", words, computer
         )
-        answers = ["timeout", "1", "bash", "-c", f"</dev/tcp/{one.address}/{self.port}"]
+        answers = ["timeout", "1", "bash", "-c", f"</dev/tcp/{computer.address}/{self.port}"]
         assert until(lambda: self.office_run(*answers).returncode == 0), (
             self.folder / f"{name}.log"
         ).read_text()
-        one.run("systemctl", "--user", "boot")
+        computer.run("systemctl", "--user", "boot")
 
     def _started(
         self, name: str, more: str, words: list[str], computer: Computer | None = None

@@ -61,7 +61,7 @@ def finds(
     found: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], others: set[str]
 ) -> bool:
     """Return whether these codes were found, with their names, and none but ``others``."""
-    codes = {one["code"] for one in found}
+    codes = {entry["code"] for entry in found}
     named = (
         name in messages_of(found, code) for code, names in expected.items() for name in names
     )
@@ -70,9 +70,9 @@ def finds(
 
 def messages_of(found: list[dict[str, Any]], code: str) -> str:
     """Return all that was said of that code."""
-    assert code in {one["code"] for one in found}, found
-    parts = [one for one in found if one["code"] == code]
+    assert code in {entry["code"] for entry in found}, found
+    parts = [entry for entry in found if entry["code"] == code]
     return "\n".join(
-        "\n".join([one["message"], *(note["message"] for note in one["notes"]), one["help"]])
-        for one in parts
+        "\n".join([part["message"], *(note["message"] for note in part["notes"]), part["help"]])
+        for part in parts
     )

@@ -8,9 +8,9 @@ _WORD = 0xFFFFFFFF
 
 def verdict(program: bytes, architecture: int, number: int, arguments: Sequence[int] = ()) -> int:
     """Return what a filter returns for a call (linux/bpf_common.h)."""
-    several = [*arguments, *[0] * (6 - len(arguments))]
+    padded = [*arguments, *[0] * (6 - len(arguments))]
     data = struct.pack(
-        "<IIQ6Q", number, architecture, 0, *(one & (1 << 64) - 1 for one in several)
+        "<IIQ6Q", number, architecture, 0, *(text & (1 << 64) - 1 for text in padded)
     )
     lines = [struct.unpack_from("HBBI", program, at) for at in range(0, len(program), 8)]
     at = value = 0

@@ -87,7 +87,7 @@ class RobotProcesses:
     def __enter__(self) -> Self:
         """Start them."""
         with ExitStack() as stack:
-            self._started(stack, "", [one.router for one in self.fleet.robots.values()])
+            self._started(stack, "", [robot.router for robot in self.fleet.robots.values()])
             for name in self.fleet.robots:
                 self.processes[name] = self._started(stack, name, [self.text])
             self._stack = stack.pop_all()
@@ -144,10 +144,10 @@ class Link:
     def close(self) -> None:
         """End all connections."""
         self.passes.set()
-        for one in (self._listener, *self._open):
+        for connection in (self._listener, *self._open):
             with suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
-            one.close()
+                connection.shutdown(socket.SHUT_RDWR)
+            connection.close()
 
     def _accept(self) -> None:
         with suppress(OSError):
@@ -165,9 +165,9 @@ class Link:
             while data := source.recv(65536):
                 self.passes.wait()
                 sink.sendall(data)
-        for one in (source, sink):
+        for connection in (source, sink):
             with suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
+                connection.shutdown(socket.SHUT_RDWR)
 
 
 if __name__ == "__main__":

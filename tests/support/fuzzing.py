@@ -118,7 +118,7 @@ def mutated(data: bytes, others: list[bytes], rng: random.Random) -> bytes:
 
 def _shown(findings: list[Finding]) -> None:
     """Render findings in each form; each says where and what in text that a terminal can take."""
-    assert not [one for one in findings if one.code == "TF903"], findings
+    assert not [finding for finding in findings if finding.code == "TF903"], findings
     for text in (
         render_text(findings, lambda *_: None, colour=False),
         render_json(findings),
@@ -139,10 +139,10 @@ def _compiled(file: Path) -> None:
     _shown(list(compiled.findings))
     assert compiled.robot or compiled.errors
     if compiled.robot and not compiled.errors:
-        for one in emit(compiled.robot):
-            one.text.encode()
-            if one.path == "plan.json":
-                read_plan(one.text, one.path)
+        for emitted in emit(compiled.robot):
+            emitted.text.encode()
+            if emitted.path == "plan.json":
+                read_plan(emitted.text, emitted.path)
 
 
 def robot(data: bytes, folder: Path) -> None:
@@ -221,7 +221,7 @@ def arguments(data: bytes, folder: Path) -> None:
 def plan(data: bytes, folder: Path) -> None:
     """A built plan: reviewed and exported, if it is one."""
     try:
-        one = read_plan(
+        read = read_plan(
             data.decode("utf-8", "surrogatepass" if len(data) % 2 else "replace"),
             str(folder / "plan.json"),
         )
@@ -230,13 +230,13 @@ def plan(data: bytes, folder: Path) -> None:
         return
     except UnicodeDecodeError:
         return
-    for line in plan_lines(one, {}):
+    for line in plan_lines(read, {}):
         line.encode()
         assert printable(line).isprintable(), ascii(line)
-    texts = {path: "" for process in one.started for path in files_of(one, process)}
-    pods = kubernetes(one, Cluster("robot:1"), texts)
-    units, services = systemd(one, Machine("/robot")), compose(one, Machine("."))
-    for made, _ in (units, services, launch(one, Machine("."), "<robot/>"), pods):
+    texts = {path: "" for process in read.started for path in files_of(read, process)}
+    pods = kubernetes(read, Cluster("robot:1"), texts)
+    units, services = systemd(read, Machine("/robot")), compose(read, Machine("."))
+    for made, _ in (units, services, launch(read, Machine("."), "<robot/>"), pods):
         for file in made:
             file.text.encode()
 
@@ -251,8 +251,8 @@ def message(data: bytes, _folder: Path) -> None:
 def transforms(data: bytes, _folder: Path) -> None:
     """The bytes of a TFMessage."""
     with suppress(ValueError):
-        for one in decode(data):
-            assert isinstance(one.child, str)
+        for transform in decode(data):
+            assert isinstance(transform.child, str)
     decoder = Decoder()
     for _ in range(2):
         with suppress(ValueError):

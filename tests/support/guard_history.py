@@ -244,7 +244,7 @@ class History:
         ]
 
     def reports(self) -> list[str]:
-        return [f"{one.code} {one.message}" for one in self.found()]
+        return [f"{finding.code} {finding.message}" for finding in self.found()]
 
     def over(self) -> list[str]:
         """Return what is said to have ended."""

@@ -107,7 +107,11 @@ def reduced(graph: dict[str, set[str]]) -> dict[str, set[str]]:
     """
     below = {part: reachable(graph, part) for part in graph}
     return {
-        part: {one for one in others if not any(one in below[via] for via in others)}
+        part: {
+            other_process
+            for other_process in others
+            if not any(other_process in below[via] for via in others)
+        }
         for part, others in graph.items()
     }
 

@@ -17,8 +17,11 @@ PRESETS = library()
 def built(file: Path) -> str:
     compiled = compile_robot(read_text(str(file)), str(file), PRESETS, read=read_text, disk=disk())
     assert compiled.robot, compiled.findings
-    assert not compiled.errors, [str(one) for one in compiled.errors][:3]
-    files = {one.path: one.text for one in emit(compiled.robot, Target(folder=str(file.parent)))}
+    assert not compiled.errors, [str(error) for error in compiled.errors][:3]
+    files = {
+        emitted.path: emitted.text
+        for emitted in emit(compiled.robot, Target(folder=str(file.parent)))
+    }
     return files["robot.urdf"]
 
 

@@ -51,7 +51,11 @@ def edge(parent: str, child: str, owner: str) -> PlanEdge:
 
 
 def plan_of(*processes: PlanProcess, guard: GuardPolicy | None = None) -> Plan:
-    edges = tuple(edge(parent, child, one.name) for one in processes for parent, child in one.owns)
+    edges = tuple(
+        edge(parent, child, process.name)
+        for process in processes
+        for parent, child in process.owns
+    )
     return Plan("rover", "", "base_link", RosSettings(), edges, processes, guard or GuardPolicy())
 
 
@@ -115,7 +119,7 @@ class History:
     def answer(self, *names: str, why: str = "") -> History:
         """Have containers answer what they were requested last about these components."""
         for name in names:
-            last = next(one for one in reversed(self.requested) if one.process == name)
+            last = next(request for request in reversed(self.requested) if request.process == name)
             if last.do == "unload":
                 self.feed(ComponentState(name, last.number, "unloaded", why))
             elif why:
@@ -126,7 +130,7 @@ class History:
 
     def loads(self) -> list[str]:
         """Return the components that containers were requested to load, in order."""
-        return [one.process for one in self.requested if one.do == "load"]
+        return [request.process for request in self.requested if request.do == "load"]
 
     def wait(self, seconds: float) -> History:
         self.now += seconds

@@ -59,7 +59,7 @@ class Chooser:
         """Return a number from 0 to count - 1."""
         return int(self._random() * count)
 
-    def one(self, items: Sequence[T]) -> T:
+    def pick(self, items: Sequence[T]) -> T:
         """Return one of the items."""
         return items[self.below(len(items))]
 
@@ -73,10 +73,10 @@ def mutated(text: str, seed: str) -> str:
         return _other_word(text, chooser)
     after = len(text) + 1
     for spot in sorted(
-        (chooser.one(spots) for _ in range(faults)), key=lambda spot: spot.entry, reverse=True
+        (chooser.pick(spots) for _ in range(faults)), key=lambda spot: spot.entry, reverse=True
     ):
         if spot.entry[1] < after:  # else it holds what has been changed
-            text = chooser.one(KINDS)(text, spot, chooser)
+            text = chooser.pick(KINDS)(text, spot, chooser)
             after = spot.entry[0]
     return text
 
@@ -85,8 +85,8 @@ def _other_word(text: str, chooser: Chooser) -> str:
     """Change a word of a text that is no tree: rows of numbers, a launch file."""
     words = re.split(r"(\s+)", text)
     at = 2 * chooser.below((len(words) + 1) // 2)
-    words[at] = chooser.one(
-        (chooser.one(VALUES), _slip(words[at], chooser), "", f"{words[at]} {words[at]}")
+    words[at] = chooser.pick(
+        (chooser.pick(VALUES), _slip(words[at], chooser), "", f"{words[at]} {words[at]}")
     )
     return "".join(words)
 
@@ -139,7 +139,7 @@ def _end(text: str, node: Any) -> int:
     end: int = node.end_mark.index
     if isinstance(node, yaml.ScalarNode) or node.flow_style:
         return end
-    return max((_end(text, one) for one in _inside(node)), default=end)
+    return max((_end(text, inner) for inner in _inside(node)), default=end)
 
 
 def _inside(node: Any) -> list[Any]:
@@ -193,7 +193,7 @@ def _slip(word: str, chooser: Chooser) -> str:
         return word[:at] + word[at : at + 2][::-1] + word[at + 2 :]
     if kind == 3:
         return word[:at] + word[at].swapcase() + word[at + 1 :]
-    return word[:at] + chooser.one("abeinorst_") + word[at + 1 :]
+    return word[:at] + chooser.pick("abeinorst_") + word[at + 1 :]
 
 
 def _rename(text: str, spot: Spot, chooser: Chooser) -> str:
@@ -214,11 +214,11 @@ def _misspell(text: str, spot: Spot, chooser: Chooser) -> str:
 
 
 def _other_value(text: str, spot: Spot, chooser: Chooser) -> str:
-    return _with(text, spot.value, chooser.one(VALUES))
+    return _with(text, spot.value, chooser.pick(VALUES))
 
 
 def _null(text: str, spot: Spot, chooser: Chooser) -> str:
-    return _with(text, spot.value, chooser.one(("null", "", "~")))
+    return _with(text, spot.value, chooser.pick(("null", "", "~")))
 
 
 def _nested(text: str, spot: Spot, chooser: Chooser) -> str:
@@ -228,13 +228,13 @@ def _nested(text: str, spot: Spot, chooser: Chooser) -> str:
     return _with(
         text,
         spot.value,
-        chooser.one(("[{}]", "{{value: {}}}", "[{}, {}]", "'{}'")).replace("{}", value),
+        chooser.pick(("[{}]", "{{value: {}}}", "[{}, {}]", "'{}'")).replace("{}", value),
     )
 
 
 def _entry(text: str, spot: Spot, chooser: Chooser) -> str:
     """Add an entry to the mapping that holds the spot, or to the one that is its value."""
-    new = chooser.one(ENTRIES)
+    new = chooser.pick(ENTRIES)
     begin, _ = spot.entry
     if text[spot.value[0]] == "{" and chooser.below(2):
         inner = spot.value[0] + 1
@@ -247,13 +247,13 @@ def _entry(text: str, spot: Spot, chooser: Chooser) -> str:
 def _swapped(text: str, spot: Spot, chooser: Chooser) -> str:
     """Put the value of another place here."""
     values = re.findall(r": ([^\n:{}\[\],#]+)", text)
-    return _with(text, spot.value, chooser.one(values).strip()) if values else text
+    return _with(text, spot.value, chooser.pick(values).strip()) if values else text
 
 
 def _unit(text: str, spot: Spot, chooser: Chooser) -> str:
     value = text[slice(*spot.value)].strip("'\"")
     number = value.split(" ", maxsplit=1)[0]
-    unit = chooser.one(
+    unit = chooser.pick(
         (
             "cm",
             "deg",

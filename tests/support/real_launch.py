@@ -37,19 +37,19 @@ def record(action: Any, context: Any) -> None:
 def record_loaded(action: Any, requests: list[Any], _context: Any) -> None:
     """Stand in the place of the calls that load components."""
     container = action._LoadComposableNodes__final_target_container_name
-    for one in requests:
+    for request in requests:
         values, extra = (
-            {one.name: parameter_value_to_python(one.value) for one in several}
-            for several in (one.parameters, one.extra_arguments)
+            {request.name: parameter_value_to_python(request.value) for request in parameters}
+            for parameters in (request.parameters, request.extra_arguments)
         )
         STARTED.append(
             {
-                "component": f"{one.package_name}/{one.plugin_name}",
+                "component": f"{request.package_name}/{request.plugin_name}",
                 "container": f"/{container.strip('/')}",
-                "node": f"{one.node_namespace.rstrip('/')}/{one.node_name}",
+                "node": f"{request.node_namespace.rstrip('/')}/{request.node_name}",
                 "extra_arguments": extra,
                 "remap": dict(
-                    reversed([rule.split(":=", 1) for rule in one.remap_rules])
+                    reversed([rule.split(":=", 1) for rule in request.remap_rules])
                 ),  # the first one counts
                 "params": {
                     name: list(value) if isinstance(value, array) else value
@@ -62,8 +62,8 @@ def record_loaded(action: Any, requests: list[Any], _context: Any) -> None:
 def executable(substitution: Any, context: Any) -> str:
     """Return the package and the program: they need not be installed."""
     package, program = (
-        "".join(map(context.perform_substitution, one))
-        for one in (substitution.package, substitution.executable)
+        "".join(map(context.perform_substitution, substitutions))
+        for substitutions in (substitution.package, substitution.executable)
     )
     return f"{package}/{program}"
 

@@ -81,7 +81,7 @@ class RunningRobot:
 
     def child(self, name: str) -> psutil.Process:
         """Return one of its processes."""
-        return next(one for one in self.below(recursive=False) if name in command_of(one)[-1:])
+        return next(pid for pid in self.below(recursive=False) if name in command_of(pid)[-1:])
 
     def wait(self) -> int:
         """Wait until it has ended by itself, and return its exit code."""

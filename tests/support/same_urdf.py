@@ -22,7 +22,7 @@ def same(source: str, source_folder: Path, built: str, built_folder: Path) -> li
     """Return in what the two differ; the folders are those that their relative paths begin in."""
     documents = ((source, source_folder), (built, built_folder))
     there, here = (_robot(_found(ET.fromstring(text), folder)) for text, folder in documents)  # noqa: S314 (our own)
-    return [one for kind in there for one in _differ(kind, there[kind], here[kind])]
+    return [difference for kind in there for difference in _differ(kind, there[kind], here[kind])]
 
 
 def _found(root: Any, folder: Path) -> Any:
@@ -35,14 +35,14 @@ def _found(root: Any, folder: Path) -> Any:
 
 def _robot(root: Any) -> dict[str, Any]:
     colours = _colours(root)
-    links = {one.get("name"): one for one in root.findall("link")}
-    joints = [one for one in root.findall("joint") if one.find("parent") is not None]
+    links = {element.get("name"): element for element in root.findall("link")}
+    joints = [element for element in root.findall("joint") if element.find("parent") is not None]
     return {
         "links": dict.fromkeys(links, ""),
-        "edges": {one.find("child").get("link"): _joint(one) for one in joints},
-        "inertials": {name: _inertial(one) for name, one in links.items() if _mass(one)},
-        "visuals": {name: _shapes(one, "visual", colours) for name, one in links.items()},
-        "collisions": {name: _shapes(one, "collision", colours) for name, one in links.items()},
+        "edges": {joint.find("child").get("link"): _joint(joint) for joint in joints},
+        "inertials": {name: _inertial(link) for name, link in links.items() if _mass(link)},
+        "visuals": {name: _shapes(link, "visual", colours) for name, link in links.items()},
+        "collisions": {name: _shapes(link, "collision", colours) for name, link in links.items()},
         "blocks": _blocks(root),
     }
 
@@ -109,8 +109,8 @@ def _colours(root: Any) -> dict[str, Any]:
 
 def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
     shapes = []
-    for one in link.findall(tag):
-        for form in one.find("geometry"):
+    for element in link.findall(tag):
+        for form in element.find("geometry"):
             if form.tag not in FORMS or 0 in _sizes(form):
                 continue
             output = {
@@ -121,8 +121,8 @@ def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
             shapes.append(
                 {
                     "form": form.tag,
-                    "pose": _pose(one),
-                    "colour": _colour(one, tag, colours),
+                    "pose": _pose(element),
+                    "colour": _colour(element, tag, colours),
                     **output,
                 }
             )
@@ -203,20 +203,24 @@ def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # 
 
 def _blocks(root: Any) -> list[Any]:
     """Return the elements next to links and joints, except those about missing ones."""
-    joints = {one.get("name") for one in root.findall("joint")}
-    there = {one.get("name") for one in root.findall("link")} | joints
+    joints = {element.get("name") for element in root.findall("joint")}
+    there = {element.get("name") for element in root.findall("link")} | joints
     blocks = []
-    for one in root:
-        idle = one.tag == "gazebo" and one.get("reference", next(iter(there))) not in there
-        idle |= one.tag == "transmission" and any(
-            inner.get("name") not in joints for inner in one.findall("joint")
+    for element in root:
+        idle = element.tag == "gazebo" and element.get("reference", next(iter(there))) not in there
+        idle |= element.tag == "transmission" and any(
+            inner.get("name") not in joints for inner in element.findall("joint")
         )
-        if isinstance(one.tag, str) and one.tag not in {"link", "joint", "material"} and not idle:
-            blocks.append(_tree(one))
+        if (
+            isinstance(element.tag, str)
+            and element.tag not in {"link", "joint", "material"}
+            and not idle
+        ):
+            blocks.append(_tree(element))
     return sorted(blocks)
 
 
 def _tree(element: Any) -> str:
-    inside = "".join(_tree(one) for one in element if isinstance(one.tag, str))
+    inside = "".join(_tree(child) for child in element if isinstance(child.tag, str))
     text = " ".join((element.text or "").split())
     return f"<{element.tag} {sorted(element.attrib.items())}>{text}{inside}"

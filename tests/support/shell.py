@@ -106,8 +106,8 @@ class Shell:
         """End it, and all that it started."""
         self.reads.set()
         with contextlib.suppress(psutil.Error):
-            for one in self.below():
-                one.kill()
+            for process in self.below():
+                process.kill()
         processes.end(self.process)
         os.close(self._slave)
         self._reader.join(5)

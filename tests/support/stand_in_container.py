@@ -45,8 +45,8 @@ class Container:
             "node": f"{request.node_namespace.rstrip('/')}/{request.node_name}",
             "plugin": f"{request.package_name}/{request.plugin_name}",
             "remap": list(request.remap_rules),
-            "params": {one.name: _plain(one) for one in request.parameters},
-            "extra": {one.name: _plain(one) for one in request.extra_arguments},
+            "params": {parameter.name: _plain(parameter) for parameter in request.parameters},
+            "extra": {argument.name: _plain(argument) for argument in request.extra_arguments},
         }
         with LOG.open("a") as log:
             log.write(json.dumps({"pid": os.getpid(), **fields}) + "\n")
@@ -98,7 +98,7 @@ def component(request: Any) -> Any:
         namespace=request.node_namespace,
         cli_args=["--ros-args", *words] if words else None,
         use_global_arguments=False,
-        parameter_overrides=[from_message(one) for one in request.parameters],
+        parameter_overrides=[from_message(parameter) for parameter in request.parameters],
         automatically_declare_parameters_from_overrides=True,
     )
     if request.plugin_name in {"demo::Static", "demo::Moving"}:

@@ -30,7 +30,7 @@ def test_two_rules_of_one_code_are_refused() -> None:
 
     again: Rule = rule("TF201")(two_parents)
     assert [
-        one.message for one in checked(Robot("r", "r.yaml", {}, (), {}, (), None), [again])
+        entry.message for entry in checked(Robot("r", "r.yaml", {}, (), {}, (), None), [again])
     ] == ["r"]
     with pytest.raises(ValueError, match="TF201"):
         by_code([*RULES.values(), again])
@@ -39,8 +39,8 @@ def test_two_rules_of_one_code_are_refused() -> None:
 def test_a_robot_sets_how_much_its_findings_matter() -> None:
     spec = Path(__file__).parent / "specs" / "levels.yaml"
     findings = compile_robot(spec.read_text("utf-8"), spec.name, library()).findings
-    assert {one.severity for one in findings if one.code == "TF401"} == {"warning"}
-    assert {one.severity for one in findings if one.code == "TF101"} == {"error"}
+    assert {entry.severity for entry in findings if entry.code == "TF401"} == {"warning"}
+    assert {entry.severity for entry in findings if entry.code == "TF101"} == {"error"}
 
 
 def test_a_finding_of_a_rule_is_at_most_as_severe_as_the_catalogue_says() -> None:
@@ -48,5 +48,7 @@ def test_a_finding_of_a_rule_is_at_most_as_severe_as_the_catalogue_says() -> Non
         if "\nrules:" not in (text := spec.read_text("utf-8")):
             findings = compile_robot(text, spec.name, library()).findings
             assert not [
-                one for one in findings if one.severity == "error" != CATALOGUE[one.code].severity
+                entry
+                for entry in findings
+                if entry.severity == "error" != CATALOGUE[entry.code].severity
             ], spec

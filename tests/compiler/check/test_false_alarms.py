@@ -20,7 +20,7 @@ def findings(text: str, *profiles: str, file: str = "robot.yaml") -> list[str]:
     findings = compile_robot(
         text, file, library(), profiles, read=lambda name: Path(name).read_text("utf-8")
     ).findings
-    return [f"{one.code} {one.message}" for one in findings]
+    return [f"{finding.code} {finding.message}" for finding in findings]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -53,4 +53,4 @@ def test_what_only_some_profiles_use_is_not_idle(profiles: tuple[str, ...]) -> N
 def test_a_misspelt_owner_is_reported_once() -> None:
     text = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nframes:\n  odom: {}\n"
     text += "  base_link: {parent: odom, owner: driv}\nprocesses: {drive: {external: true}}\n"
-    assert [one[:5] for one in findings(text)] == ["TF302"]
+    assert [finding[:5] for finding in findings(text)] == ["TF302"]

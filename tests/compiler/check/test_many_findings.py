@@ -18,7 +18,7 @@ def seconds(links: int) -> float:
         f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{lines}", "r.yaml", library()
     ).findings
     took = time.process_time() - began
-    assert len([one for one in findings if one.code == "TF203"]) == links
+    assert len([finding for finding in findings if finding.code == "TF203"]) == links
     return took
 
 
@@ -36,6 +36,6 @@ def test_fifty_publishers_of_fixed_edges_are_not_yet_too_many(count: int, codes:
         "tfcompose: 1\nrobot: r\nlinks: {base_link:"
         f" {{}}}}\nframes:\n{frames}processes:\n{processes}"
     )
-    assert {one.code for one in compile_robot(text, "r.yaml", library()).findings} & {
+    assert {finding.code for finding in compile_robot(text, "r.yaml", library()).findings} & {
         "TF309"
     } == codes

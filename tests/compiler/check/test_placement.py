@@ -23,7 +23,7 @@ CIRCLE = "optics: {scan: {horizontal: 360 deg, near: 0.05, far: 10}}"
 def found(text: str, code: str) -> list[Finding]:
     done = compile_robot(HEAD + text, "r.yaml", library())
     assert not done.errors, done.errors
-    return [one for one in done.findings if one.code == code]
+    return [finding for finding in done.findings if finding.code == code]
 
 
 def scanner_at_a_wall(yaw_deg: float, scanner: str = CIRCLE) -> list[Finding]:
@@ -41,11 +41,11 @@ def scanner_at_a_wall(yaw_deg: float, scanner: str = CIRCLE) -> list[Finding]:
 @pytest.mark.parametrize("yaw_deg", [0, 40, 150, 180, -115])
 def test_a_blind_sector_is_where_the_wall_is_also_across_180_deg(yaw_deg: float) -> None:
     (blind,) = scanner_at_a_wall(yaw_deg)
-    size, start, end = (float(one) for one in re.findall(r"-?\d+", blind.message)[:3])
+    size, start, end = (float(number) for number in re.findall(r"-?\d+", blind.message)[:3])
     half = math.degrees(math.atan2(2, 1))
     assert size == pytest.approx(2 * half, abs=1.5)
-    for angle, meant in ((start, -half - yaw_deg), (end, half - yaw_deg)):
-        assert (angle - meant + 180) % 360 - 180 == pytest.approx(0, abs=1.1)
+    for angle, expected in ((start, -half - yaw_deg), (end, half - yaw_deg)):
+        assert (angle - expected + 180) % 360 - 180 == pytest.approx(0, abs=1.1)
 
 
 def test_a_sector_ends_with_the_view_of_a_scanner_of_270_deg() -> None:

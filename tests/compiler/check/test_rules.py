@@ -75,7 +75,7 @@ def moments(name: str, scale: Vector) -> Moments:
 
 
 def places(findings: tuple[Finding, ...]) -> set[tuple[int, str]]:
-    return {(one.span.line, one.code) for one in findings if one.span}
+    return {(entry.span.line, entry.code) for entry in findings if entry.span}
 
 
 @pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
@@ -87,9 +87,11 @@ def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Pa
     )
     for profile, more in expected.items():
         assert profile
-        alone = {(one.code, one.message) for one in compiled(spec).findings}
+        alone = {(entry.code, entry.message) for entry in compiled(spec).findings}
         added = [
-            one for one in compiled(spec, profile).findings if (one.code, one.message) not in alone
+            entry
+            for entry in compiled(spec, profile).findings
+            if (entry.code, entry.message) not in alone
         ]
         assert places(tuple(added)) == more
 
@@ -122,22 +124,24 @@ CONFLICTS = {
 
 @pytest.mark.parametrize(("code", "spec"), CONFLICTS.items())
 def test_a_conflict_shows_its_other_place_too(code: str, spec: str) -> None:
-    of_code = [one for one in compiled(SPECS[0].parent / spec).findings if one.code == code]
+    of_code = [entry for entry in compiled(SPECS[0].parent / spec).findings if entry.code == code]
     shown = [
-        one for one in of_code if any(note.span and note.span != one.span for note in one.notes)
+        entry
+        for entry in of_code
+        if any(note.span and note.span != entry.span for note in entry.notes)
     ]
     assert shown
-    alone = [one for one in of_code if one not in shown]
-    assert all("self" in one.message for one in alone), "only a frame on itself has one place"
+    alone = [entry for entry in of_code if entry not in shown]
+    assert all("self" in entry.message for entry in alone), "only a frame on itself has one place"
 
 
 @pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> None:
     lines = spec.read_text("utf-8").splitlines()
-    for one in compiled(spec).findings:
-        assert one.message
-        assert "\n" not in one.message + one.help
-        span = one.span
+    for entry in compiled(spec).findings:
+        assert entry.message
+        assert "\n" not in entry.message + entry.help
+        span = entry.span
         assert span
         assert span.file == spec.name
         assert 1 <= span.line <= len(lines)
@@ -147,7 +151,7 @@ def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> Non
 
 def test_findings_come_in_the_order_of_the_file() -> None:
     findings = compiled(SPECS[0].parent / "everything.yaml").findings
-    at = [(one.span.line, one.span.column) for one in findings if one.span]
+    at = [(entry.span.line, entry.span.column) for entry in findings if entry.span]
     assert at == sorted(at)
 
 
@@ -161,7 +165,7 @@ def test_findings_come_in_the_order_of_the_file() -> None:
 )
 def test_the_nearest_known_name_is_the_advice(spec: str, wrong: str, right: str) -> None:
     findings = compiled(SPECS[0].parent / f"{spec}.yaml").findings
-    assert any(wrong in words(one) and right in words_of(one.help) for one in findings)
+    assert any(wrong in words(entry) and right in words_of(entry.help) for entry in findings)
 
 
 def test_the_advice_for_a_chain_of_joints_that_follow_each_other_moves_the_last_as_before() -> (
@@ -177,7 +181,7 @@ def test_the_advice_for_a_chain_of_joints_that_follow_each_other_moves_the_last_
     links = "links: {base_link: {}, a: {}, b: {}, c: {}}\njoints:\n"
     text = f"tfcompose: 1\nrobot: r\n{links}" + "\n".join(lines)
     findings = compile_robot(text, "r.yaml", library()).findings
-    (chain,) = [one for one in findings if one.code == "TF708"]
+    (chain,) = [entry for entry in findings if entry.code == "TF708"]
     assert "{joint: a, multiplier: -4, offset: -0.9}" in chain.help
 
 
@@ -190,5 +194,7 @@ def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on() -> None:
     robot = compiled(SPECS[0].parent / "no_frames.yaml").robot
     assert robot
     findings = check(robot, [two_parents, *RULES.values()])
-    assert {one.code for one in findings} == {"TF903", "TF206"}
-    assert next(one for one in findings if one.code == "TF903").span == Span("no_frames.yaml")
+    assert {entry.code for entry in findings} == {"TF903", "TF206"}
+    assert next(entry for entry in findings if entry.code == "TF903").span == Span(
+        "no_frames.yaml"
+    )

@@ -21,16 +21,16 @@ def test_with_all_rules_off_that_can_be_off_a_robot_is_built_or_refused(spec: Pa
     text = spec.read_text("utf-8")
     codes = sorted(
         {
-            one.code
-            for one in compile_robot(text, spec.name, PRESETS).findings
-            if can_be_allowed(one.code)
+            finding.code
+            for finding in compile_robot(text, spec.name, PRESETS).findings
+            if can_be_allowed(finding.code)
         }
     )
     if "\nrules:" in text or not codes:
         return
     rules = ", ".join(f"{code}: off" for code in codes)
     made = compile_robot(f"{text}\nrules: {{{rules}}}\n", spec.name, PRESETS)
-    assert not {one.code for one in made.findings} & set(codes)
+    assert not {finding.code for finding in made.findings} & set(codes)
     if made.robot and not made.errors:
         (plan,) = [file.text for file in emit(made.robot) if file.path == "plan.json"]
         assert read_plan(plan, "plan.json").robot == made.robot.name
@@ -50,7 +50,10 @@ def test_what_leaves_nothing_to_build_always_counts(text: str, code: str) -> Non
         f"tfcompose: 1\nrobot: r\nrules: {{{code}: off}}\n{text}  # tfcompose: allow {code}"
         " because I say so\n"
     )
-    found = {one.code: one.severity for one in compile_robot(text, "r.yaml", PRESETS).findings}
+    found = {
+        finding.code: finding.severity
+        for finding in compile_robot(text, "r.yaml", PRESETS).findings
+    }
     assert (found[code], found["TF017"]) == ("error", "error")
 
 
@@ -80,7 +83,7 @@ def test_a_rule_that_is_off_does_not_run(monkeypatch: pytest.MonkeyPatch) -> Non
     requested: list[str] = []
 
     def check(_: object, rules: list[Rule]) -> list[Finding]:
-        requested.extend(one.code for one in rules)
+        requested.extend(finding.code for finding in rules)
         return []
 
     monkeypatch.setattr("tfcompose.compiler.compile.check", check)

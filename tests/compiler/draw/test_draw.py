@@ -142,8 +142,8 @@ def nothing_overlaps(drawing: Drawing, frames: int) -> None:
     assert len(boxes) == frames
     for some in (texts, boxes):
         some.sort()
-        for index, one in enumerate(some):
-            assert not any(overlaps(one, other) for other in some[index + 1 :])
+        for index, picture in enumerate(some):
+            assert not any(overlaps(picture, other) for other in some[index + 1 :])
     for left, top, right, bottom in (*texts, *boxes):
         assert left > 0
         assert top > 0
@@ -222,7 +222,9 @@ def test_in_columns_no_edge_to_a_child_of_the_trunk_crosses_a_box(
     graph = tree(seed, frames, poses=poses)
     drawing = draw(graph, "columns")
     boxes = [around(box) for box in boxes_of(drawing, "box", "root")]
-    for curve in (one for one in drawing.shapes if isinstance(one, Curve) and len(one.points) > 4):
+    for curve in (
+        shape for shape in drawing.shapes if isinstance(shape, Curve) and len(shape.points) > 4
+    ):
         for (x1, y1), (x2, y2) in pairwise(curve.points):
             line = (min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2))
             assert not any(overlaps(line, box) for box in boxes)
@@ -245,8 +247,8 @@ def test_downwards_a_child_is_below_its_parent_and_to_its_right() -> None:
         name: around(box)
         for name, box in zip(_names(drawing), boxes_of(drawing, "box", "root"), strict=True)
     }
-    assert all(boxes[one.parent][0] < boxes[one.child][0] for one in graph.arrows)
-    assert all(boxes[one.parent][3] < boxes[one.child][1] for one in graph.arrows)
+    assert all(boxes[arrow.parent][0] < boxes[arrow.child][0] for arrow in graph.arrows)
+    assert all(boxes[arrow.parent][3] < boxes[arrow.child][1] for arrow in graph.arrows)
 
 
 def test_a_collapsed_sensor_is_its_mount_and_what_leads_to_other_frames() -> None:
@@ -257,7 +259,7 @@ def test_a_collapsed_sensor_is_its_mount_and_what_leads_to_other_frames() -> Non
     groups = (Group("camera", ("cam", "lens", "optical", "imu")), Group("laser", ("laser",)))
     graph = collapse_groups(Graph("robot", frames, arrows, groups))
     assert graph.frames == ("base", "cam", "lens", "filter", "laser")
-    assert [(one.parent, one.child, one.detail) for one in graph.arrows] == [
+    assert [(arrow.parent, arrow.child, arrow.detail) for arrow in graph.arrows] == [
         ("base", "cam", "5 Hz +2"),
         ("cam", "lens", ""),
         ("lens", "filter", ""),
@@ -368,10 +370,10 @@ def test_mermaid_text_has_each_edge_once_and_draws_moving_ones_otherwise() -> No
     lines = mermaid(graph).splitlines()
     assert lines[0] == "flowchart LR"
     assert sum(" --> " in line or " -->|" in line for line in lines) == sum(
-        one.kind == "static" for one in graph.arrows
+        arrow.kind == "static" for arrow in graph.arrows
     )
     assert sum(" -.->|" in line for line in lines) == sum(
-        one.kind != "static" for one in graph.arrows
+        arrow.kind != "static" for arrow in graph.arrows
     )
     styled = [
         int(number)

@@ -103,4 +103,4 @@ def test_a_part_brings_no_second_router() -> None:
     compiled = compile_robot(text, "r.yaml", library(), read=lambda _: part)
     assert compiled.robot
     assert not compiled.errors, compiled.errors
-    assert [one.name for one in compiled.robot.processes].count(ROUTER) == 1
+    assert [process.name for process in compiled.robot.processes].count(ROUTER) == 1

@@ -105,7 +105,7 @@ def test_a_key_of_a_process_reaches_the_plan(keys: str) -> None:
 
 
 def test_no_key_that_a_process_of_the_plan_has_as_well_is_left_out() -> None:
-    shared = {one.name for one in fields(Process) if one.init} & keys_of("run")
+    shared = {field.name for field in fields(Process) if field.init} & keys_of("run")
     shared -= {setting.key for setting in SETTINGS}  # which are followed into the process itself
     assert shared <= {name for words in REACH.values() for name in words}
 
@@ -323,7 +323,9 @@ def test_a_stand_in_takes_the_place_of_a_shells_command() -> None:
         f"{HEAD}  a: {{run: 'x | y', shell: true}}\nprofiles: {{sim: {{processes: {{a: {{external:"
         " true}}}}\n"
     )
-    assert [one.code for one in compile_robot(text, "r.yaml", library(), ["sim"]).findings] == []
+    assert [
+        finding.code for finding in compile_robot(text, "r.yaml", library(), ["sim"]).findings
+    ] == []
 
 
 def test_a_stand_in_is_kept_and_ended_as_what_it_stands_in_for() -> None:
@@ -337,7 +339,7 @@ def test_a_stand_in_is_kept_and_ended_as_what_it_stands_in_for() -> None:
     compiled = compile_robot(text, "r.yaml", library(), ["sim"])
     assert compiled.findings == ()
     assert compiled.robot
-    stand_in = next(one for one in compiled.robot.processes if one.name == "a")
+    stand_in = next(process for process in compiled.robot.processes if process.name == "a")
     assert (stand_in.restart, stand_in.max_restarts, stand_in.stop.timeout_s) == ("always", 2, 3.0)
     assert (stand_in.remap, stand_in.env) == ({"/tf": "/seen/tf"}, {"A": "b"})
     assert (stand_in.cwd, stand_in.ready, stand_in.params) == (None, None, {})
@@ -439,7 +441,7 @@ def test_a_file_that_is_missing_or_of_no_known_format_is_a_finding(
     assert old in text
     found = built_at(tmp_path, "build/r", text.replace(old, new))
     assert isinstance(found, list)
-    assert code in [one.code for one in found]
+    assert code in [finding.code for finding in found]
 
 
 def test_a_node_that_is_listed_alone_does_not_rename_the_others() -> None:
@@ -455,7 +457,7 @@ def test_parameters_of_a_process_with_nodes_are_for_each_of_its_nodes() -> None:
     nodes = "nodes: {b: {params: {x: 3}}, c: {}}, params: {x: 1, y: 2}"
     files = files_of(f"a: {{{EXE}, {nodes}}}")
     params = yaml.safe_load(files["params/a.yaml"])
-    given = {node: one["ros__parameters"] for node, one in params.items()}
+    given = {node: value["ros__parameters"] for node, value in params.items()}
     assert given == {"/**": {"x": 1, "y": 2}, "/r1/b": {"x": 3, "y": 2}, "/r1/c": {"x": 1, "y": 2}}
 
 
@@ -571,7 +573,9 @@ def test_words_of_a_parameter_file_are_values_as_ros_reads_them(tmp_path: Path) 
         text, str(tmp_path / "r.yaml"), library(), read=lambda path: Path(path).read_text()
     )
     assert compiled.robot
-    (component,) = [one.component for one in plan_of(compiled.robot).processes if one.component]
+    (component,) = [
+        process.component for process in plan_of(compiled.robot).processes if process.component
+    ]
     assert component.params == {
         "n": 8,
         "r": 1000.0,
@@ -615,7 +619,7 @@ def test_a_plan_whose_component_nobody_can_load_is_refused(old: str, new: str, w
     assert old in text
     with pytest.raises(RejectedError) as error:
         read_plan(text.replace(old, new), "plan.json")
-    assert [one.code for one in error.value.findings] == ["TF902"]
+    assert [finding.code for finding in error.value.findings] == ["TF902"]
     assert word in error.value.findings[0].message
 
 
@@ -641,4 +645,4 @@ def test_a_sensors_driver_may_be_a_component_with_the_parameters_of_its_preset()
         eye.component.params.items() >= {"x": 1, "camera_name": "eye", "publish_tf": True}.items()
     )
     assert ("eye_link", "eye_depth_frame") in eye.owns
-    assert [one.sensor for one in eye.drives] == ["eye"]
+    assert [driven.sensor for driven in eye.drives] == ["eye"]

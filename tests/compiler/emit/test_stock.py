@@ -152,7 +152,7 @@ def test_static_sends_the_description_even_where_it_has_no_edge() -> None:
     [(", frame_prefix: r1/, shared_frames: [mast]", "TF316"), ("}\nbase: mast\nvars: {", "TF315")],
 )
 def test_what_a_stock_publisher_cannot_do_is_reported(more: str, code: str) -> None:
-    assert [one.code for one in compiled(more).errors] == [code]
+    assert [finding.code for finding in compiled(more).errors] == [code]
 
 
 FLEET = """tfcompose: 1

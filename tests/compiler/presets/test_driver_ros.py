@@ -107,9 +107,9 @@ def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., RunningRobot]]:
         return running[-1]
 
     yield run
-    for one in running:
-        below = one.below() if one.popen.poll() is None else []
-        one.end()
+    for robot in running:
+        below = robot.below() if robot.popen.poll() is None else []
+        robot.end()
         assert not psutil.wait_procs(below, TIMEOUT_S)[1]
 
 

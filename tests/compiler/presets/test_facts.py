@@ -82,7 +82,7 @@ def is_there(frame: PresetFrame, fact: dict[str, Any], name: str, *, optical: bo
 )
 def test_a_frame_is_where_the_package_of_its_vendor_has_it(preset: str, name: str) -> None:
     fact = FACTS[preset][name]
-    found = [one for frames in variants(preset) for one in frames.get(name, [])]
+    found = [frame for frames in variants(preset) for frame in frames.get(name, [])]
     assert found, f"no {name}"
     hung = [frame for parent, frame in found if parent == fact["parent"]]
     if (preset, name) in DRIVER_S_WAY:

@@ -39,10 +39,10 @@ BY_DEFAULT = {
 
 def optics(preset: str, **options: str) -> dict[str, Optics]:
     known = KNOWN.get(preset).options
-    every = {key: list(one.values) for key, one in known.items() if one.type == "set"}
+    every = {key: list(fact.values) for key, fact in known.items() if fact.type == "set"}
     chosen = {
         **every,
-        **{key: True for key, one in known.items() if one.type == "bool"},
+        **{key: True for key, fact in known.items() if fact.type == "bool"},
         **options,
     }
     if preset == "realsense/t265":
@@ -54,16 +54,16 @@ def optics(preset: str, **options: str) -> dict[str, Optics]:
     done = compile_robot(
         f"tfcompose: 1\nrobot: r\nlinks: {{base_link: {{}}}}\nsensors: {entry}\n", "r.yaml", KNOWN
     )
-    assert {one.code for one in done.errors} <= {"TF605"}, done.errors
+    assert {finding.code for finding in done.errors} <= {"TF605"}, done.errors
     assert done.robot
-    return {one.stream: one for one in done.robot.sensors[0].optics}
+    return {stream_optics.stream: stream_optics for stream_optics in done.robot.sensors[0].optics}
 
 
 def degrees(sector: tuple[float, float] | None) -> Any:
     return sector and pytest.approx(tuple(map(math.degrees, sector)), abs=1e-9)
 
 
-def assert_says(one: Optics, preset: str, fact: dict[str, Any]) -> None:
+def assert_says(stream: Optics, preset: str, fact: dict[str, Any]) -> None:
     """Assert that every figure of the facts is that of the stream."""
 
     def expect(key: str, found: Any, value: Any) -> None:
@@ -74,30 +74,32 @@ def assert_says(one: Optics, preset: str, fact: dict[str, Any]) -> None:
             angle = fact[word]
             expect(
                 key,
-                degrees(getattr(one, key)),
+                degrees(getattr(stream, key)),
                 tuple(angle if isinstance(angle, list) else (-angle / 2, angle / 2)),
             )
     if "angle_min_deg" in fact:
         expect(
-            "horizontal", degrees(one.horizontal), (fact["angle_min_deg"], fact["angle_max_deg"])
+            "horizontal",
+            degrees(stream.horizontal),
+            (fact["angle_min_deg"], fact["angle_max_deg"]),
         )
     if "dfov_deg" in fact and not (preset.startswith("zed/") and preset != "zed/zed2"):
         expect(
             "diagonal",
-            one.diagonal and pytest.approx(math.degrees(one.diagonal)),
+            stream.diagonal and pytest.approx(math.degrees(stream.diagonal)),
             fact["dfov_deg"],
         )
     if "width" in fact and "height" in fact:
-        expect("resolution", one.resolution, (fact["width"], fact["height"]))
+        expect("resolution", stream.resolution, (fact["width"], fact["height"]))
     span = fact.get("depth_range_m") or fact.get("range_m")
     if span:
-        expect("range", [one.near, one.far], span)
+        expect("range", [stream.near, stream.far], span)
     if "vertical_angles_deg" in fact:
-        assert [math.degrees(angle) for angle in one.elevations] == pytest.approx(
+        assert [math.degrees(angle) for angle in stream.elevations] == pytest.approx(
             fact["vertical_angles_deg"]
         )
-    assert one.baseline == fact.get("baseline_m", one.baseline)
-    assert one.shutter == fact.get("shutter", one.shutter)
+    assert stream.baseline == fact.get("baseline_m", stream.baseline)
+    assert stream.shutter == fact.get("shutter", stream.shutter)
 
 
 def of_mode(fact: dict[str, Any], mode: dict[str, Any]) -> dict[str, Any]:
@@ -156,14 +158,14 @@ def test_an_image_of_4_to_3_is_a_crop_and_narrower() -> None:
 
 @pytest.mark.parametrize("preset", KNOWN.names)
 def test_every_value_of_a_vendor_keeps_its_source(preset: str) -> None:
-    for stream, one in KNOWN.get(preset).optics.items():
+    for stream, stream_optics in KNOWN.get(preset).optics.items():
         keys = {
             key
-            for key, value in one
+            for key, value in stream_optics
             if value is not None and key not in {"frame", "kind", "source", "when"}
         }
-        given = {key for source in one.source or () for key in source.of}
-        exempt = {"backward"} | ({"vertical"} if one.vertical == (0, 0) else set())
+        given = {key for source in stream_optics.source or () for key in source.of}
+        exempt = {"backward"} | ({"vertical"} if stream_optics.vertical == (0, 0) else set())
         assert keys - exempt == given - exempt, stream
 
 

@@ -61,9 +61,9 @@ def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
             plain = compile_robot(spec(name, options, tf, {}), "r.yaml", KNOWN)
             requested = [
                 frame
-                for one in plain.findings
-                if one.code == "TF605"
-                for frame in REQUESTED.findall(one.help)
+                for finding in plain.findings
+                if finding.code == "TF605"
+                for frame in REQUESTED.findall(finding.help)
             ]
             frames = {frame: {"xyz": [0.1, 0.2, 0.3], "rpy": [0, 0, 0]} for frame in requested}
             done = compile_robot(spec(name, options, tf, frames), "r.yaml", KNOWN)
@@ -74,7 +74,7 @@ def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
                 assert not done.errors, (tf, options, done.errors)
                 made.append((tf, options, done.robot))
             else:
-                assert {one.code for one in done.errors} <= {"TF604"}
+                assert {finding.code for finding in done.errors} <= {"TF604"}
     return made
 
 

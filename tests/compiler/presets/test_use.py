@@ -71,9 +71,9 @@ def driver_parameters(robot: Robot) -> dict[str, Any]:
 def unknown(preset: str, **keys: Any) -> dict[str, Any]:
     findings = compiled(preset, **keys).findings
     requested: dict[str, Any] = {}
-    for one in findings:
-        if one.code == "TF605":
-            requested |= yaml.safe_load(one.help.partition(" write: ")[2])["sensors"]["s"][
+    for finding in findings:
+        if finding.code == "TF605":
+            requested |= yaml.safe_load(finding.help.partition(" write: ")[2])["sensors"]["s"][
                 "frames"
             ]
     values = {"xyz": [1, 2, 3], "rpy": [0, 0, 0]}
@@ -143,7 +143,7 @@ def test_a_driver_gets_the_final_names_of_its_frames(name: str) -> None:
         done = compiled(
             name, f'ros: {{frame_prefix: "{prefix}"}}\n' if prefix else "", frames=overrides
         )
-        if prefix and any(one.code == "TF604" for one in done.errors):
+        if prefix and any(finding.code == "TF604" for finding in done.errors):
             continue  # other frames of it have no parameter
         assert done.robot
         assert not done.errors
@@ -267,7 +267,7 @@ def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:
     assert edge_of(robot, "s_left_camera_frame").parent == "s_right_camera_frame"
     frames = {"s_left_camera_frame": {"parent": "s_righ_camera_frame"}}
     findings = compiled("oak/oak-d", tf="driver", frames=frames).errors
-    assert [(one.code, one.help) for one in findings] == [
+    assert [(finding.code, finding.help) for finding in findings] == [
         ("TF203", "did you mean s_right_camera_frame?")
     ]
 
@@ -278,17 +278,18 @@ def test_what_nobody_knows_is_requested_with_the_yaml_to_write_and_is_never_a_ze
         "sensors: {s: {frames: {s_color_frame: {xyz: [x, y, z], rpy: [roll, pitch, yaw]}}}}"
     )
     expect(findings[0], "TF605", "realsense/d457", "s_color_frame", "s_link", yaml_to_write)
-    (several,) = compiled(
+    (unpublished,) = compiled(
         "realsense/d457", tf="tfcompose", options={"streams": ["infra2", "color"]}
     ).findings
-    expect(several, "TF605", "s_color_frame and s_infra2_frame")
+    expect(unpublished, "TF605", "s_color_frame and s_infra2_frame")
     robot = robot_of(
         "realsense/d457", frames={"s_color_frame": {"xyz": [0, -0.059, 0], "rpy": [0, 0, 0]}}
     )
     assert edge_of(robot, "s_color_frame").pose.xyz == (0, -0.059, 0)
     assert not edge_of(robot, "s_color_frame").nominal
     assert [
-        one.code for one in compiled("realsense/d457", options={"streams": ["depth"]}).findings
+        finding.code
+        for finding in compiled("realsense/d457", options={"streams": ["depth"]}).findings
     ] == []
 
 
@@ -418,7 +419,9 @@ def test_a_preset_that_stands_before_a_built_in_one_is_reported_and_may_change_i
     done = compiled("realsense/d435i", "preset_path: mine/\n", str(tmp_path / "r.yaml"))
     assert done.robot
     assert edge_of(done.robot, "s_color_frame").pose.xyz == (0, 0.0149, 0)
-    assert [(one.code, one.severity) for one in done.findings] == [("TF607", "warning")]
+    assert [(finding.code, finding.severity) for finding in done.findings] == [
+        ("TF607", "warning")
+    ]
     assert (
         compiled("realsense/d435", "preset_path: mine\n", str(tmp_path / "r.yaml")).findings == ()
     )
@@ -428,7 +431,7 @@ def test_a_folder_that_is_not_there_is_reported(tmp_path: Path) -> None:
     findings = compiled(
         "generic/imu", "preset_path: [mine, .]\n", str(tmp_path / "r.yaml")
     ).findings
-    assert [(one.code, one.message) for one in findings] == [
+    assert [(finding.code, finding.message) for finding in findings] == [
         ("TF001", f"preset_path: no folder {tmp_path}/mine")
     ]
 
@@ -441,7 +444,7 @@ def test_what_is_wrong_in_a_preset_is_found_in_its_file(
     write(tmp_path, "me/mast", MAST.replace(old, new, 1))
     findings = compiled("me/mast", "preset_path: [.]\n", str(tmp_path / "r.yaml")).findings
     assert findings
-    assert all(one.span and one.span.file.endswith("mast.yaml") for one in findings)
+    assert all(finding.span and finding.span.file.endswith("mast.yaml") for finding in findings)
 
 
 def test_a_python_package_adds_presets_by_an_entry_point(
@@ -563,10 +566,10 @@ def test_a_driver_of_several_processes_is_started_as_all_of_them() -> None:
         "velodyne/vlp16", 'ros: {"namespace": "r1"}\n', driver=driver, options={"scan": True}
     )
     plan = {
-        one["name"]: one
-        for one in json.loads({f.path: f.text for f in emit(robot)}["plan.json"])["processes"]
+        process["name"]: process
+        for process in json.loads({f.path: f.text for f in emit(robot)}["plan.json"])["processes"]
     }
-    assert {name: one["nodes"] for name, one in plan.items() if name.startswith("s_")} == {
+    assert {name: value["nodes"] for name, value in plan.items() if name.startswith("s_")} == {
         "s_transform": ["/r1/s/velodyne_transform_node"],
         "s_laserscan": ["/r1/s/velodyne_laserscan_node"],
     }
@@ -579,14 +582,17 @@ def test_a_driver_of_several_processes_is_started_as_all_of_them() -> None:
         == "${executable:velodyne_laserscan/velodyne_laserscan_node}"
     )
     assert {
-        one["host"] for name, one in plan.items() if name in {"s", "s_transform", "s_laserscan"}
+        value["host"]
+        for name, value in plan.items()
+        if name in {"s", "s_transform", "s_laserscan"}
     } == {"roof"}
     names = {process.name for process in robot_of("velodyne/vlp16").processes}
     assert {"s", "s_transform"} <= names
     assert "s_laserscan" not in names
     for alone in ("none", {"external": True}, {"run": {"package": "mine", "executable": "lidar"}}):
         assert not any(
-            one.name.startswith("s_") for one in robot_of("velodyne/vlp16", driver=alone).processes
+            process.name.startswith("s_")
+            for process in robot_of("velodyne/vlp16", driver=alone).processes
         )
     (wrong,) = compiled(
         "velodyne/vlp16", 'processes: {"s_transform": {"external": true}}\n'

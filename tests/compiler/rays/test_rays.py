@@ -223,9 +223,9 @@ def test_a_mesh_is_hit_where_the_same_primitive_is(tmp_path: Path) -> None:
     assert cast("s", SCAN, (), [PosedShape("b", shape, turned[1])]).inside["b"] == pytest.approx(
         0.5, abs=0.01
     )
-    for one, other in zip(by_mesh.rays, by_shape.rays, strict=True):
-        if math.isfinite(one.distance) and math.isfinite(other.distance):
-            assert one.distance == pytest.approx(other.distance, abs=0.02)
+    for ray, other in zip(by_mesh.rays, by_shape.rays, strict=True):
+        if math.isfinite(ray.distance) and math.isfinite(other.distance):
+            assert ray.distance == pytest.approx(other.distance, abs=0.02)
 
 
 @pytest.mark.filterwarnings(
@@ -274,7 +274,7 @@ KINDS = [
 ]
 
 
-@pytest.mark.parametrize("optics", KINDS, ids=lambda one: one.stream)
+@pytest.mark.parametrize("optics", KINDS, ids=lambda ray: ray.stream)
 def test_every_ray_is_a_unit_vector_in_the_field_of_view_and_its_opposite_is_not(
     optics: Optics,
 ) -> None:

@@ -59,28 +59,31 @@ def test_it_is_valid_and_says_what_was_found(spec: Path) -> None:
     driver = run["tool"]["driver"]
     assert driver["name"] == "tfcompose"
     assert len(run["results"]) == len(found)
-    for result, one in zip(run["results"], found, strict=True):
-        assert result["level"] == one.severity
-        assert driver["rules"][result["ruleIndex"]]["id"] == result["ruleId"] == one.code
-        assert result["message"]["text"].startswith(one.message)
+    for result, finding in zip(run["results"], found, strict=True):
+        assert result["level"] == finding.severity
+        assert driver["rules"][result["ruleIndex"]]["id"] == result["ruleId"] == finding.code
+        assert result["message"]["text"].startswith(finding.message)
         (location,) = result["locations"]
         region = location["physicalLocation"]["region"]
-        assert one.span
-        assert (region["startLine"], region["startColumn"]) == (one.span.line, one.span.column)
+        assert finding.span
+        assert (region["startLine"], region["startColumn"]) == (
+            finding.span.line,
+            finding.span.column,
+        )
         assert (region["endLine"], region["endColumn"]) >= (
             region["startLine"],
             region["startColumn"],
         )
-        related = [note.message for note in one.notes if note.span]
+        related = [note.message for note in finding.notes if note.span]
         assert [
             place["message"]["text"] for place in result.get("relatedLocations", [])
         ] == related
 
 
 def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> None:
-    found = [one for spec in SPECS for one in findings(spec)]
+    found = [finding for spec in SPECS for finding in findings(spec)]
     rules = source_text(found)["tool"]["driver"]["rules"]
-    assert [rule["id"] for rule in rules] == sorted({one.code for one in found})
+    assert [rule["id"] for rule in rules] == sorted({finding.code for finding in found})
     for rule in rules:
         assert rule["name"] == CATALOGUE[rule["id"]].name
         page = CATALOGUE.page(rule["id"])
@@ -114,7 +117,7 @@ def test_each_rule_links_to_its_page_if_the_pages_have_a_url(tmp_path: Path) -> 
     ],
 )
 def test_a_file_with_any_name_is_a_uri_that_leads_back_to_it(file: str) -> None:
-    one = Finding(
+    first = Finding(
         "TF101",
         "unknown_key",
         "error",
@@ -122,7 +125,7 @@ def test_a_file_with_any_name_is_a_uri_that_leads_back_to_it(file: str) -> None:
         Span(file, 2, 3, 2, 4),
         (Note("n", Span(file)), Note("no place")),
     )
-    (result,) = source_text([one])["results"]
+    (result,) = source_text([first])["results"]
     uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
     parsed = urlparse(uri)
     assert not set(uri) & set(' "<>\\^`{|}')

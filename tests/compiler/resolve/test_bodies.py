@@ -157,16 +157,16 @@ def test_a_body_in_a_mesh_that_faces_inwards_is_turned_and_a_cavity_is_none(
     box, apart, cavity = (trimesh.creation.box([side] * 3) for side in (0.6, 0.2, 0.4))
     box.apply_translation([2, 0, 0])
     cavity.apply_translation([2.05, 0, 0])
-    meant = ring.volume + 0.6**3 + 0.2**3 - 0.4**3
-    x = (2 * 0.6**3 - 2.05 * 0.4**3) / meant
-    for one in (apart, cavity):
-        one.invert()
+    expected = ring.volume + 0.6**3 + 0.2**3 - 0.4**3
+    x = (2 * 0.6**3 - 2.05 * 0.4**3) / expected
+    for inverted in (apart, cavity):
+        inverted.invert()
     mesh: Any = trimesh.util.concatenate([cavity, ring, apart, box])
     if inwards:
         mesh.invert()
     mesh.export(tmp_path / "several.stl")
     found = inertial_of({"visual": {"mesh": "several.stl"}, "inertial": {"density": 1}}, tmp_path)
-    assert found.mass == pytest.approx(meant, rel=1e-6)
+    assert found.mass == pytest.approx(expected, rel=1e-6)
     assert found.pose.xyz == pytest.approx((x, 0, 0), abs=1e-6)
 
 

@@ -48,7 +48,7 @@ def compiled(robot: str, **files: str) -> Compiled:
 
 
 def edge_of(result: Compiled, child: str) -> Edge:
-    assert not result.findings, [one.message for one in result.findings]
+    assert not result.findings, [finding.message for finding in result.findings]
     edge = result.robot and result.robot.parent_edge(child)
     assert edge
     return edge
@@ -222,7 +222,9 @@ def test_degrees_and_radians_are_xacros_tags_and_other_tags_are_refused() -> Non
         ".nan",
     ):
         text = f"base_link: {{lens: {values.replace('!degrees 90', wrong)}}}\n"
-        assert {one.code for one in compiled(robot, c_yaml=text).findings} == {"TF610"}, wrong
+        assert {finding.code for finding in compiled(robot, c_yaml=text).findings} == {"TF610"}, (
+            wrong
+        )
 
 
 KALIBR = (
@@ -301,7 +303,9 @@ def test_a_calibration_in_another_frame_than_the_parent_is_solved_through_fixed_
     )
     kit = Pose((1.0, 0.0, 0.0), (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
     assert_same(kit @ edge.pose, MEASURED)
-    assert "TF612" in {one.code for one in compiled(robot % "c.yaml", c_yaml=autoware()).findings}
+    assert "TF612" in {
+        finding.code for finding in compiled(robot % "c.yaml", c_yaml=autoware()).findings
+    }
 
 
 def test_a_matrix_is_taken_the_way_that_parent_and_child_say() -> None:
@@ -437,17 +441,19 @@ def test_what_cannot_be_used_is_reported_where_the_file_is_named_with_a_note_int
     findings = compiled(
         "frames: {lens: {parent: base_link, calibration: c.yaml}}\n", c_yaml=text
     ).findings
-    assert {one.code for one in findings} == {code}
-    assert {one.span.file for one in findings if one.span} == {"r.yaml"}
-    assert {note.span.file for one in findings for note in one.notes if note.span} == {"c.yaml"}
+    assert {finding.code for finding in findings} == {code}
+    assert {finding.span.file for finding in findings if finding.span} == {"r.yaml"}
+    assert {note.span.file for finding in findings for note in finding.notes if note.span} == {
+        "c.yaml"
+    }
 
 
 def test_a_missing_file_and_a_missing_reader_are_findings() -> None:
     robot = "frames: {lens: {parent: base_link, calibration: c.yaml}}\n"
-    assert [one.code for one in compiled(robot).findings] == ["TF610"]
-    assert [one.code for one in compile_robot(HEAD + robot, "r.yaml", library()).findings] == [
-        "TF610"
-    ]
+    assert [finding.code for finding in compiled(robot).findings] == ["TF610"]
+    assert [
+        finding.code for finding in compile_robot(HEAD + robot, "r.yaml", library()).findings
+    ] == ["TF610"]
 
 
 def test_paths_are_relative_to_the_file_that_writes_them() -> None:
@@ -479,7 +485,7 @@ NOMINAL = (
 )
 def test_a_change_from_nominal_beyond_the_limit_is_a_finding(limit: str, codes: set[str]) -> None:
     assert {
-        one.code for one in compiled(NOMINAL % (QUAT, limit), c_yaml=autoware()).findings
+        finding.code for finding in compiled(NOMINAL % (QUAT, limit), c_yaml=autoware()).findings
     } == codes
 
 
@@ -508,7 +514,7 @@ def test_the_nominal_pose_is_taken_to_the_frame_in_which_it_was_measured() -> No
     assert calibration
     assert calibration.nominal
     assert_same(calibration.nominal, MEASURED)
-    assert not {one.code for one in done.findings} & {"TF615", "TF616"}
+    assert not {finding.code for finding in done.findings} & {"TF615", "TF616"}
 
 
 def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -> None:
@@ -516,7 +522,7 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     nominal = f"xyz: {list(back.xyz)}, quat_xyzw: {list(back.quat_xyzw)}, "
     robot = "frames: {lens: {parent: base_link, %scalibration: c.yaml}}\n"
     findings = compiled(robot % nominal, c_yaml=autoware()).findings
-    assert [(one.code, one.severity) for one in findings] == [("TF615", "warning")]
+    assert [(finding.code, finding.severity) for finding in findings] == [("TF615", "warning")]
     assert "c.yaml:2 (autoware)" in findings[0].message
     assert "0 mm and 0 deg" in findings[0].message, "the distance of the inverse"
     # A body 1 m to the left; the sensor is said to be 1 m ahead, looking left, so the way back
@@ -530,7 +536,7 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     outside = compile_robot(
         head + mast + robot % "", "r.yaml", library(), read=lambda _: text
     ).findings
-    assert [(one.code, one.severity) for one in outside] == [("TF615", "warning")]
+    assert [(finding.code, finding.severity) for finding in outside] == [("TF615", "warning")]
     assert not compiled(robot % "", c_yaml=autoware()).findings
 
 
@@ -555,7 +561,7 @@ def test_a_calibration_is_outside_of_what_a_capsule_or_a_mesh_fills(
     done = compile_robot(
         robot, str(tmp_path / "r.yaml"), library(), read=lambda _: text, disk=disk()
     )
-    assert {one.code for one in done.findings} == found
+    assert {finding.code for finding in done.findings} == found
 
 
 def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> None:
@@ -566,13 +572,13 @@ def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> Non
     )
     text = "base_link: {lens: {x: 0.0125, y: 0, z: 0.05, roll: 0, pitch: 0, yaw: !degrees 90}}\n"
     findings = compiled(frames, c_yaml=text).findings
-    assert [one.code for one in findings] == ["TF616"]
+    assert [finding.code for finding in findings] == ["TF616"]
     assert "12.5 mm and 180 deg" in findings[0].message
     head = HEAD.replace("TF640: off", "TF640: off, TF615: off")
     findings = compile_robot(
         head + frames, "r.yaml", library(), read=reader({"c.yaml": text})
     ).findings
-    assert [one.code for one in findings] == ["TF616"]
+    assert [finding.code for finding in findings] == ["TF616"]
 
 
 def test_a_quaternion_that_fits_with_its_w_first_is_given_in_the_right_order() -> None:
@@ -626,8 +632,10 @@ def test_a_nominal_pose_with_w_first_or_of_the_body_is_named(
         " c.yaml}}\n"
     )
     text = f"base_link: {{{frame}: {{x: 0, y: 0, z: 0.05, {measured}}}}}\n"
-    findings = [one for one in compiled(frames, c_yaml=text).findings if one.code == "TF616"]
-    assert [advice in one.help for one in findings] == [True]
+    findings = [
+        finding for finding in compiled(frames, c_yaml=text).findings if finding.code == "TF616"
+    ]
+    assert [advice in finding.help for finding in findings] == [True]
 
 
 def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> None:
@@ -639,20 +647,20 @@ def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> Non
     assert not compiled(robot, c_yaml=text.replace("4.9", "5.1")).findings, (
         "kit's y points to the rear"
     )
-    assert [one.code for one in compiled(robot, c_yaml=text.replace("4.9", "-4.9")).findings] == [
-        "TF615"
-    ]
+    assert [
+        finding.code for finding in compiled(robot, c_yaml=text.replace("4.9", "-4.9")).findings
+    ] == ["TF615"]
 
 
 def test_comments_in_launch_files_are_no_entries_and_each_publisher_is_one() -> None:
     read = partial(read_calibration, file="c.launch", form="auto", span=Span("r.yaml"))
-    assert [one.name for one in read(moveit_launch()).entries] == ["base_link → lens"]
+    assert [entry.name for entry in read(moveit_launch()).entries] == ["base_link → lens"]
     two = moveit_launch().replace(
         "</launch>", moveit_launch().partition("-->")[2].replace("lens", "other")
     )
-    assert [one.child for one in read(two).entries] == ["lens", "other"]
+    assert [entry.child for entry in read(two).entries] == ["lens", "other"]
     angles = '<launch><node type="static_transform_publisher" args="1 2 3 0 0 0.5 a b"/></launch>'
-    assert [one.code for one in read(angles).findings] == ["TF610"]
+    assert [finding.code for finding in read(angles).findings] == ["TF610"]
 
 
 def test_a_profile_takes_another_file_and_a_missing_one_has_no_place() -> None:
@@ -662,7 +670,7 @@ def test_a_profile_takes_another_file_and_a_missing_one_has_no_place() -> None:
     night = compile_robot(HEAD + robot, "r.yaml", library(), ["night"], read=texts.__getitem__)
     assert edge_of(night, "lens").pose.xyz[0] == 0.2
     missing = compiled(robot).findings
-    assert [(one.code, one.notes) for one in missing] == [("TF610", ())]
+    assert [(finding.code, finding.notes) for finding in missing] == [("TF610", ())]
 
 
 def test_a_lens_that_the_driver_places_is_a_finding_at_the_calibration() -> None:
@@ -671,7 +679,9 @@ def test_a_lens_that_the_driver_places_is_a_finding_at_the_calibration() -> None
         " c.yaml\n"
     )
     findings = compiled(robot, c_yaml=autoware(child=OPTICAL)).findings
-    assert [(one.code, one.span.line) for one in findings if one.span] == [("TF405", 9)]
+    assert [(finding.code, finding.span.line) for finding in findings if finding.span] == [
+        ("TF405", 9)
+    ]
 
 
 TEXTS = [*STRAIGHT.values(), KALIBR.format(ROWS)]
@@ -687,8 +697,11 @@ def settle(text: str, form: str) -> None:
     for output in ("", f", format: {form}", ", parent: cam0, child: imu"):
         result = compiled(ROBOT % output, c_yaml=text)
         assert result.robot
-        assert "TF903" not in {one.code for one in result.findings}
-        assert all("\n" not in one.message and len(one.message) < 2000 for one in result.findings)
+        assert "TF903" not in {finding.code for finding in result.findings}
+        assert all(
+            "\n" not in finding.message and len(finding.message) < 2000
+            for finding in result.findings
+        )
 
 
 @st.composite

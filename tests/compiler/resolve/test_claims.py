@@ -45,7 +45,7 @@ def params_of(done: Compiled, process: str) -> dict[str, dict[str, Any]]:
 
 
 def output(done: Compiled) -> list[str]:
-    return [f"{one.code} {one.message}" for one in done.findings]
+    return [f"{finding.code} {finding.message}" for finding in done.findings]
 
 
 PREFIXED = "isolate: frames, shared_frames: [map]"
@@ -223,7 +223,7 @@ def test_a_claim_that_cannot_be_settled_is_one_finding_with_the_exact_switch(mor
 )
 def test_what_is_switched_off_or_allowed_is_no_finding(more: str) -> None:
     done = compiled(more)
-    assert [one for one in output(done) if not one.startswith("TF815")] == []
+    assert [line for line in output(done) if not line.startswith("TF815")] == []
 
 
 def test_an_owner_that_is_configured_not_to_publish_is_a_finding_at_the_parameter() -> None:
@@ -235,7 +235,7 @@ def test_an_owner_that_is_configured_not_to_publish_is_a_finding_at_the_paramete
 
 def test_an_edge_that_no_node_of_its_owner_is_known_to_publish_is_a_finding() -> None:
     done = compiled(**{"owner: ekf": "owner: slam"})
-    (finding,) = [one for one in done.findings if one.code == "TF332"]
+    (finding,) = [entry for entry in done.findings if entry.code == "TF332"]
     assert {"slam", "odom", "base_link"} <= words(finding)
 
 

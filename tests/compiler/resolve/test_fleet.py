@@ -37,8 +37,8 @@ def share_of(text: str = ROBOT) -> Process:
     done = compiled(text)
     assert done.robot
     assert not done.findings, done.findings
-    (one,) = (process for process in done.robot.processes if process.name == "fleet_share")
-    return one
+    (process,) = (process for process in done.robot.processes if process.name == "fleet_share")
+    return process
 
 
 def test_the_robot_is_that_of_its_name_or_of_another_and_is_restarted() -> None:
@@ -98,7 +98,7 @@ def test_what_is_wrong_with_the_fleets_file_is_found(
     text: str, fleet: str, file: str | None, code: str
 ) -> None:
     findings = compiled(text, fleet).findings
-    assert [(one.code, one.span and one.span.file) for one in findings] == [(code, file)]
+    assert [(entry.code, entry.span and entry.span.file) for entry in findings] == [(code, file)]
 
 
 @pytest.mark.parametrize(
@@ -106,5 +106,5 @@ def test_what_is_wrong_with_the_fleets_file_is_found(
 )
 def test_edges_are_not_missed_in_a_robot_that_is_refused(edit: tuple[str, str]) -> None:
     found = compiled(ROBOT.replace(*edit))
-    assert "TF887" not in {one.code for one in found.findings}
+    assert "TF887" not in {entry.code for entry in found.findings}
     assert found.errors

@@ -118,7 +118,9 @@ def cell(tmp_path: Path) -> Any:
 
 
 def sound(compiled: Compiled) -> Any:
-    assert not compiled.findings, [(str(one.span), one.message) for one in compiled.findings]
+    assert not compiled.findings, [
+        (str(finding.span), finding.message) for finding in compiled.findings
+    ]
     return compiled.robot
 
 
@@ -140,20 +142,29 @@ def test_an_urdf_is_taken_twice_with_everything_in_it_renamed(cell: Any) -> None
     text = files(cell(LEFT, RIGHT))["robot.urdf"]
     root = ET.fromstring(text)  # noqa: S314 (our own text)
     for kind in ("link", "joint", "transmission"):
-        names = [one.get("name") for one in root.findall(kind)]
+        names = [element.get("name") for element in root.findall(kind)]
         assert len(names) == len(set(names))
-    assert [one.get("joint") for one in root.iter("mimic")] == ["left_shoulder", "right_shoulder"]
-    assert [one.get("reference") for one in root.findall("gazebo")] == [
+    assert [element.get("joint") for element in root.iter("mimic")] == [
+        "left_shoulder",
+        "right_shoulder",
+    ]
+    assert [element.get("reference") for element in root.findall("gazebo")] == [
         "left_upper",
         None,
         "right_upper",
     ]
-    assert [one.find("joint").get("name") for one in root.findall("transmission")] == [  # type: ignore[union-attr]
+    assert [element.find("joint").get("name") for element in root.findall("transmission")] == [  # type: ignore[union-attr]
         "left_shoulder",
         "right_shoulder",
     ]
-    assert {one.get("name") for one in root.iter("actuator")} == {"left_motor", "right_motor"}
-    assert {one.get("name") for one in root.iter("material")} == {"left_grey", "right_grey"}
+    assert {element.get("name") for element in root.iter("actuator")} == {
+        "left_motor",
+        "right_motor",
+    }
+    assert {element.get("name") for element in root.iter("material")} == {
+        "left_grey",
+        "right_grey",
+    }
 
 
 def test_a_shape_is_there_though_readers_of_the_urdf_alone_would_stumble_over_its_tabs(
@@ -176,8 +187,8 @@ def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_p
     for name, kind in (("one", "fixed"), ("two", "continuous")):
         full = text.format(name, kind) + f'<child link="{name}_b"/></joint></robot>'
         (tmp_path / f"{name}.urdf").write_text(full, encoding="utf-8")
-    one, two = "one: {urdf: one.urdf, parent: table}", "two: {urdf: two.urdf, parent: table}"
-    (found,) = cell(one, two).findings
+    first, two = "one: {urdf: one.urdf, parent: table}", "two: {urdf: two.urdf, parent: table}"
+    (found,) = cell(first, two).findings
     assert found.code == "TF505"
     assert {"two", "j"} <= words(found)
     assert [note.span.file.rpartition("/")[2] for note in found.notes if note.span] == [
@@ -185,7 +196,7 @@ def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_p
         "two.urdf",
     ]
     assert "prefix: two/" in found.help
-    assert sound(cell(one, two.replace("parent", "prefix: t_, parent")))
+    assert sound(cell(first, two.replace("parent", "prefix: t_, parent")))
 
 
 def test_what_is_about_links_and_joints_that_are_removed_is_removed_too(
@@ -202,14 +213,16 @@ def test_what_is_about_links_and_joints_that_are_removed_is_removed_too(
     )
     (tmp_path / "third/arm/arm.urdf").write_text(text, encoding="utf-8")
     root = ET.fromstring(files(cell(LEFT))["robot.urdf"])  # noqa: S314 (our own text)
-    assert [one.get("reference") for one in root.findall("gazebo")] == [
+    assert [element.get("reference") for element in root.findall("gazebo")] == [
         "left_upper",
         None,
         "nobody",
     ]
-    assert [one.get("name") for one in root.findall("transmission")] == ["left_drive"]
-    assert [one.get("name") for one in root.findall("ros2_control")] == ["left_both"]
-    assert [one.get("name") for one in root.findall("ros2_control/joint")] == ["left_shoulder"]
+    assert [element.get("name") for element in root.findall("transmission")] == ["left_drive"]
+    assert [element.get("name") for element in root.findall("ros2_control")] == ["left_both"]
+    assert [element.get("name") for element in root.findall("ros2_control/joint")] == [
+        "left_shoulder"
+    ]
 
 
 def test_names_with_other_characters_are_taken_from_others_and_renamed_everywhere(
@@ -221,8 +234,11 @@ def test_names_with_other_characters_are_taken_from_others_and_renamed_everywher
     (tmp_path / "third/arm/arm.urdf").write_text(text, encoding="utf-8")
     root = ET.fromstring(files(cell(LEFT))["robot.urdf"])  # noqa: S314 (our own text)
     assert root.find("link[@name='left_upper & <arm>']") is not None
-    assert [one.get("reference") for one in root.findall("gazebo")] == ["left_upper & <arm>", None]
-    (joint,) = (one.get("name") for one in root.findall("transmission/joint"))
+    assert [element.get("reference") for element in root.findall("gazebo")] == [
+        "left_upper & <arm>",
+        None,
+    ]
+    (joint,) = (element.get("name") for element in root.findall("transmission/joint"))
     assert joint == root.find("joint/mimic").get("joint") == "left_shoulder-joint 1.0"  # type: ignore[union-attr]
 
 
@@ -320,7 +336,7 @@ def test_a_part_of_which_nothing_is_left_because_its_own_part_was_refused_says_n
         findings = compile_robot(
             text, str(tmp_path / "r.yaml"), library(), read=read_text, disk=disk()
         ).findings
-        assert [one.code for one in findings] == ["TF001"], more
+        assert [finding.code for finding in findings] == ["TF001"], more
 
 
 def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(
@@ -362,13 +378,15 @@ def test_a_floating_joint_of_a_foreign_file_is_reported_where_it_can_have_an_own
 
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
     root = ET.fromstring(files(cell(LEFT))["robot.urdf"])  # noqa: S314 (our own text)
-    joint = next(one for one in root.findall("joint") if one.get("name") == "left_shoulder")
+    joint = next(
+        element for element in root.findall("joint") if element.get("name") == "left_shoulder"
+    )
     output = {child.tag: child.attrib for child in joint}
     assert output["limit"] == {"lower": "-3", "upper": "3", "effort": "10", "velocity": "1"}
     assert output["dynamics"] == {"damping": "0.5", "friction": "0.25"}
     assert output["axis"] == {"xyz": "0 0 1"}
     assert [float(value) for value in output["safety_controller"].values()] == [-2, 2, 4, 8]
-    base = next(one for one in root.findall("link") if one.get("name") == "left_base")
+    base = next(element for element in root.findall("link") if element.get("name") == "left_base")
     mesh, colour = next(base.iter("mesh")), next(base.iter("color"))
     assert (mesh.get("filename"), mesh.get("scale")) == ("package://arm/base.stl", "2 2 2")
     assert colour.get("rgba") == "0.5 0.25 0.125 1"
@@ -471,7 +489,7 @@ def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(
         f' reference="{name}"/>\'}}\nros2_control: {{hw: {{plugin: a/B, joints: {{{name}:'
         f" {{state: {{position: {{}}}}}}}}}}}}\nbase: {name}",
     )
-    assert [one.code for one in result.findings] == ["TF724", "TF203"]
+    assert [finding.code for finding in result.findings] == ["TF724", "TF203"]
     assert "ur" in result.findings[0].message.split()
     assert result.findings[1].message.split()[-1] == "tabel"
 
@@ -656,7 +674,7 @@ def test_what_cannot_be_a_part_is_reported_with_its_place(  # noqa: PLR0913, PLR
     cell: Any, part: str, code: str, message: str, advice: str, place: str
 ) -> None:
     errors = cell(part).errors
-    assert [one.code for one in errors] == [code], [one.message for one in errors]
+    assert [finding.code for finding in errors] == [code], [finding.message for finding in errors]
     assert message in errors[0].message
     assert " object at 0x" not in errors[0].message
     assert advice in errors[0].help

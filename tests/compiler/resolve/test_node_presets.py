@@ -45,7 +45,7 @@ def test_a_node_preset_knows_what_to_start(
     done = compiled(f"  {process}")
     assert (done.errors, done.robot is not None) == ((), True)
     assert done.robot
-    ekf = next(one for one in done.robot.processes if one.name == "ekf")
+    ekf = next(process for process in done.robot.processes if process.name == "ekf")
     assert (ekf.kind, ekf.package, ekf.executable, ekf.argv) == ("run", package, executable, argv)
     assert [node.name for node in ekf.ros_nodes] == ["/ekf"]
 
@@ -60,7 +60,7 @@ def test_a_node_preset_knows_what_to_start(
     ],
 )
 def test_what_no_preset_starts_is_one_finding(process: str, code: str) -> None:
-    assert [one.code for one in compiled(f"  {process}").errors] == [code]
+    assert [finding.code for finding in compiled(f"  {process}").errors] == [code]
 
 
 @pytest.mark.parametrize("run", ["", "run: {args: [x]}, "])
@@ -72,7 +72,7 @@ def test_a_mistyped_preset_is_named_where_nothing_says_what_to_start(run: str) -
 def test_a_name_with_a_namespace_stays_a_name() -> None:
     done = compiled("  ekf: {node: left/filter, external: true}")
     assert done.robot
-    (ekf,) = [one for one in done.robot.processes if one.name == "ekf"]
+    (ekf,) = [process for process in done.robot.processes if process.name == "ekf"]
     assert [node.name for node in ekf.ros_nodes] == ["/left/filter"]
 
 

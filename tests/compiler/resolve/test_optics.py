@@ -23,7 +23,11 @@ def compiled(sensor: str) -> Compiled:
 
 def optics_in(done: Compiled) -> dict[str, Optics]:
     assert not done.errors, done.errors
-    return {one.stream: one for sensor in robot_in(done).sensors for one in sensor.optics}
+    return {
+        stream_optics.stream: stream_optics
+        for sensor in robot_in(done).sensors
+        for stream_optics in sensor.optics
+    }
 
 
 def test_what_nobody_says_is_not_known() -> None:
@@ -107,5 +111,5 @@ def test_a_frame_of_the_optics_goes_by_the_name_that_the_user_gives_it() -> None
 )
 def test_optics_that_cannot_be_true_are_refused(sensor: str, code: str, word: str) -> None:
     findings = compiled(sensor).errors
-    assert [one.code for one in findings] == [code], findings
+    assert [finding.code for finding in findings] == [code], findings
     assert word in findings[0].message + findings[0].help

@@ -47,7 +47,7 @@ def compiled(params: str, **files: str) -> Compiled:
 
 def source_text(params: str, **files: str) -> str:
     result = compiled(params, **files)
-    assert not result.errors, [one.message for one in result.errors]
+    assert not result.errors, [finding.message for finding in result.errors]
     assert result.robot
     return {file.path: file.text for file in emit(result.robot)}["params/planner.yaml"]
 
@@ -80,7 +80,7 @@ def test_sections_of_several_files_have_the_order_in_which_their_names_come_firs
 def test_a_container_needs_no_parameters_of_its_own() -> None:
     robot = HEAD.partition("processes")[0] + ("containers: {box: {params: {file: p.yaml}}}\n")
     done = compile_robot(robot, "r.yaml", library(), read=reader({"p.yaml": FILE}))
-    assert "TF334" not in {one.code for one in done.findings}
+    assert "TF334" not in {finding.code for finding in done.findings}
 
 
 def test_a_file_may_be_named_as_everywhere_else() -> None:
@@ -117,10 +117,10 @@ def test_a_parameter_that_contradicts_the_clock_is_found_where_it_is_given(
     params: str, places: list[str]
 ) -> None:
     sim = "/**: {ros__parameters: {use_sim_time: true}}"
-    (finding,) = (one for one in compiled(params, sim=sim).errors if one.code == "TF335")
+    (finding,) = (entry for entry in compiled(params, sim=sim).errors if entry.code == "TF335")
     assert [str(finding.span), *(str(note.span) for note in finding.notes)] == places
     over = compiled("{file: sim.yaml, use_sim_time: false}", sim=sim)
-    assert "TF335" not in {one.code for one in over.findings}
+    assert "TF335" not in {entry.code for entry in over.findings}
 
 
 def test_a_name_in_the_file_is_the_full_one_with_and_without_a_leading_slash() -> None:
@@ -153,8 +153,8 @@ def test_the_digest_of_the_plan_changes_with_the_file() -> None:
             next(file.text for file in emit(robot) if file.path == "plan.json"), "p"
         ).spec_digest
 
-    one, other = "/**: {ros__parameters: {a: 1}}", "/**: {ros__parameters: {a: 2}}"
-    assert digest(one) == digest(one) != digest(other)
+    first, other = "/**: {ros__parameters: {a: 1}}", "/**: {ros__parameters: {a: 2}}"
+    assert digest(first) == digest(first) != digest(other)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,9 @@ def test_what_is_no_parameter_of_the_node_is_a_finding(
     params: str, file: str, code: str, message: str
 ) -> None:
     findings = compiled(params, q=file).findings
-    assert [one.code for one in findings] == [code], [one.message for one in findings]
+    assert [finding.code for finding in findings] == [code], [
+        finding.message for finding in findings
+    ]
     assert message in findings[0].message
 
 
@@ -187,8 +189,8 @@ def test_of_several_files_one_need_not_name_the_node_but_none_is_a_warning_for_e
     assert compiled("{file: [common.yaml, q.yaml]}", **files).findings == ()
     files["q"] = files["common"]
     findings = compiled("{file: [common.yaml, q.yaml]}", **files).findings
-    assert [(one.code, one.severity) for one in findings] == [("TF334", "warning")] * 2
-    first, second = (one.span.column for one in findings if one.span)
+    assert [(finding.code, finding.severity) for finding in findings] == [("TF334", "warning")] * 2
+    first, second = (finding.span.column for finding in findings if finding.span)
     assert second - first == len("common.yaml, ")
 
 
@@ -198,7 +200,7 @@ def test_an_alias_bomb_is_refused() -> None:
     lines += [f"b{i}: &b{i} [{', '.join([f'*b{i - 1}'] * 10)}]\n" for i in range(1, 9)]
     lines.append("planner: {ros__parameters: {x: *b8}}\n")
     errors = compiled("{file: q.yaml}", q="".join(lines)).errors
-    assert "TF008" in {one.code for one in errors}
+    assert "TF008" in {finding.code for finding in errors}
 
 
 @pytest.mark.parametrize(
@@ -245,4 +247,4 @@ def test_a_file_that_is_nested_too_deep_is_refused_and_does_not_end_the_interpre
     deep = f"p: {{ros__parameters: {{x: {'[' * 200_000}}}}}"
     with pytest.raises(RejectedError) as rejected:
         load_params(deep, "deep.yaml")
-    assert [one.code for one in rejected.value.findings] == ["TF008"]
+    assert [finding.code for finding in rejected.value.findings] == ["TF008"]

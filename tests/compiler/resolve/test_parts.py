@@ -88,12 +88,12 @@ def built(text: str, **files: str) -> dict[str, str]:
 
 
 def codes(result: Compiled) -> set[str]:
-    return {one.code for one in result.errors}
+    return {finding.code for finding in result.errors}
 
 
 def only(result: Compiled, code: str) -> Any:
-    assert codes(result) == {code}, [(one.code, one.message) for one in result.errors]
-    return next(one for one in result.findings if one.code == code)
+    assert codes(result) == {code}, [(finding.code, finding.message) for finding in result.errors]
+    return next(finding for finding in result.findings if finding.code == code)
 
 
 def test_a_component_of_a_part_is_in_the_container_of_the_part() -> None:
@@ -283,7 +283,10 @@ def test_drivers_of_sensors_that_are_removed_are_removed_and_others_stay() -> No
         for robot in (full, trimmed)
     ]
     assert drivers == [{"left/low", "left/high"}, {"left/high"}]
-    assert [[one.name for one in robot.hardware] for robot in (full, trimmed)] == [["left_h"], []]
+    assert [[block.name for block in robot.hardware] for robot in (full, trimmed)] == [
+        ["left_h"],
+        [],
+    ]
     assert "left_low_link" not in trimmed.frames
 
 
@@ -411,9 +414,9 @@ def test_a_clock_of_the_parts_own_is_refused() -> None:
 def test_a_fault_in_the_parts_file_is_reported_there_and_names_the_part() -> None:
     rover = ROVER.replace("xyz: [0, 0.2, 0]", "xyz: [0, 0.2]")
     finding, *others = (
-        one
-        for one in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
-        if one.code == "TF103"
+        entry
+        for entry in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
+        if entry.code == "TF103"
     )
     assert finding.span
     assert finding.span.file == "robots/rover.yaml"
@@ -424,9 +427,9 @@ def test_a_fault_in_the_parts_file_is_reported_there_and_names_the_part() -> Non
 def test_a_finding_of_a_rule_about_the_parts_file_names_the_parts() -> None:
     rover = ROVER.replace("wheel_link: {}", "wheel_lnk: {}")
     finding = next(
-        one
-        for one in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
-        if one.code == "TF203"
+        entry
+        for entry in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
+        if entry.code == "TF203"
     )
     assert [note.message for note in finding.notes if note.message.startswith("as the part")] == [
         "as the part one",
@@ -449,7 +452,7 @@ def test_a_comment_in_the_parts_file_allows_its_finding() -> None:
         "  idle: {external: true} # tfcompose: allow TF815 because it logs\n  slam: {run",
     )
     assert "TF815" not in {
-        one.code for one in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
+        finding.code for finding in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
     }
 
 

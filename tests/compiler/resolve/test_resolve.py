@@ -80,7 +80,7 @@ def test_poses_relative_to_each_other_are_one_finding(count: int) -> None:
         f"f{n}: {{parent: base_link, relative_to: f{(n + 1) % count}}}" for n in range(count)
     )
     findings = compiled(f"frames: {{{frames}}}\n").findings
-    assert [one.code for one in findings] == ["TF404"]
+    assert [finding.code for finding in findings] == ["TF404"]
 
 
 @pytest.mark.parametrize("frame", ["c_link", "c_color_optical_frame", "c_bottom_screw_frame"])
@@ -239,7 +239,7 @@ def test_a_sensors_frame_takes_the_units_own_rotation_and_keeps_the_presets_plac
 
 def test_to_place_through_nominal_values_is_a_warning_that_the_units_own_values_silence() -> None:
     place = "place: c_color_frame"
-    assert [one.code for one in compiled(CAMERA % place).findings] == ["TF405"]
+    assert [finding.code for finding in compiled(CAMERA % place).findings] == ["TF405"]
     assert not compiled(
         CAMERA % f"{place}, frames: {{c_color_frame: {{xyz: [0, 0.0149, 0]}}}}"
     ).findings
@@ -381,7 +381,7 @@ def test_a_fixed_edge_has_the_name_of_a_joint_where_one_is_given() -> None:
         "c_bottom_screw_frame": "c_fix",
         "c_color_frame": "lens_fix",
     }
-    urdf = next(one.text for one in emit(robot) if one.path == "robot.state_publisher.urdf")
+    urdf = next(file.text for file in emit(robot) if file.path == "robot.state_publisher.urdf")
     assert all(f'<joint name="{name}" type="fixed">' in urdf for name in named.values())
     assert '<joint name="c_bottom_screw_frame_to_c_link" type="fixed">' in urdf
 
@@ -389,7 +389,7 @@ def test_a_fixed_edge_has_the_name_of_a_joint_where_one_is_given() -> None:
 @pytest.mark.parametrize("parents", ["[]", "[base_link, base_link]", "[base_link, 3]"])
 def test_a_list_of_parents_has_different_names(parents: str) -> None:
     findings = compiled(TOOL.replace("[base_link, rack]", parents)).findings
-    assert [one.code for one in findings if one.code.startswith("TF1")] != []
+    assert [finding.code for finding in findings if finding.code.startswith("TF1")] != []
 
 
 def test_a_frame_that_a_driver_sends_again_and_again_inside_a_sensor_can_be_placed() -> None:
@@ -422,7 +422,7 @@ def test_an_unknown_name_under_after_is_answered_with_the_processes_that_there_a
         "joints: {lift: {type: revolute, parent: base_link, child: tray, axis: z}}\n"
         "processes: {drive: {run: [drive]}, map: {run: [map], after: {laser_scanner: ready}}}\n"
     )
-    (unknown,) = [one for one in done.errors if one.code == "TF813"]
+    (unknown,) = [finding for finding in done.errors if finding.code == "TF813"]
     assert re.findall(r"[\w/]+", unknown.help) == [
         "there",
         "is",

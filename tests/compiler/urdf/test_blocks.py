@@ -57,17 +57,17 @@ EXPECTED = """<ros2_control name="base" type="system" rw_rate="100" is_async="tr
 def test_a_rate_of_zero_is_that_of_all_as_ros2_control_reads_it() -> None:
     """Source: ros2_control's component_parser, which takes 0 for the controller manager's rate."""
     for tree in urdfs(HARDWARE.replace("rw_rate: 100", "rw_rate: 0")):
-        assert [one.get("rw_rate") for one in tree.iter("ros2_control")] == ["0"]
+        assert [element.get("rw_rate") for element in tree.iter("ros2_control")] == ["0"]
 
 
-def same(one: ET.Element, other: ET.Element) -> bool:
-    texts = [(element.text or "").strip() for element in (one, other)]
-    return (one.tag, one.attrib, texts[0], len(one)) == (
+def same(first: ET.Element, other: ET.Element) -> bool:
+    texts = [(element.text or "").strip() for element in (first, other)]
+    return (first.tag, first.attrib, texts[0], len(first)) == (
         other.tag,
         other.attrib,
         texts[1],
         len(other),
-    ) and all(same(*pair) for pair in zip(one, other, strict=True))
+    ) and all(same(*pair) for pair in zip(first, other, strict=True))
 
 
 def test_hardware_is_emitted_as_ros2_control_reads_it() -> None:
@@ -79,9 +79,10 @@ def test_hardware_is_emitted_as_ros2_control_reads_it() -> None:
 def test_the_joints_that_there_are_are_named_in_the_files_order_and_not_all_of_a_hundred() -> None:
     names = [f"j{number}" for number in range(100)]
     joints = "".join(
-        f"  {one}: {{type: continuous, parent: base_link, child: {one}_link}}\n" for one in names
+        f"  {name}: {{type: continuous, parent: base_link, child: {name}_link}}\n"
+        for name in names
     )
-    links = "".join(f"  {one}_link: {{}}\n" for one in names)
+    links = "".join(f"  {name}_link: {{}}\n" for name in names)
     control = "ros2_control: {h: {plugin: a/B, joints: {gripper: {state: [position]}}}}\n"
     text = f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{links}joints:\n{joints}{control}"
     (finding,) = compile_robot(text, "r.yaml", library()).errors
@@ -94,7 +95,7 @@ def test_a_raw_block_is_emitted_as_it_stands_in_both_files() -> None:
         f"      {line}" for line in block.replace("1.2", "${mu}").splitlines()
     )
     for urdf in urdfs(text):
-        assert [one.get("reference") for one in urdf.findall("gazebo")] == ["wheel", None]
+        assert [element.get("reference") for element in urdf.findall("gazebo")] == ["wheel", None]
         assert urdf.findtext("gazebo/mu1") == "1.2"
     compiled = compile_robot(HEAD + text, "r.yaml", library())
     assert compiled.robot
@@ -104,12 +105,13 @@ def test_a_raw_block_is_emitted_as_it_stands_in_both_files() -> None:
 
 def test_one_block_needs_no_name_and_keeps_its_lines() -> None:
     for urdf in urdfs("xml: |\n  <gazebo reference='wheel'/>\n"):
-        assert [one.get("reference") for one in urdf.findall("gazebo")] == ["wheel"]
+        assert [element.get("reference") for element in urdf.findall("gazebo")] == ["wheel"]
     compiled = compile_robot(
         HEAD + "xml: |\n  <gazebo/>\n  <gazebo reference='x'/>\n", "r.yaml", library()
     )
     assert [
-        (one.code, one.span and (one.span.line, one.span.column)) for one in compiled.errors
+        (finding.code, finding.span and (finding.span.line, finding.span.column))
+        for finding in compiled.errors
     ] == [("TF203", (7, 22))]
 
 
@@ -146,7 +148,7 @@ def test_a_finding_in_a_block_has_the_line_of_the_robot_file(
 def test_a_block_cannot_bring_entities_or_end_the_robot() -> None:
     for evil in ("</robot><robot>", "<!DOCTYPE a [<!ENTITY b 'c'>]>", "]]>", "<a", "&nope;"):
         compiled = compile_robot(HEAD + f"xml:\n  a: |\n    {evil}\n", "r.yaml", library())
-        assert {one.code for one in compiled.errors} <= {"TF018", "TF719"}, evil
+        assert {finding.code for finding in compiled.errors} <= {"TF018", "TF719"}, evil
         assert compiled.errors, evil
 
 
@@ -169,17 +171,26 @@ processes: {x: {external: true}}
     assert not compiled.findings, compiled.findings
     assert compiled.robot
     urdf = ET.fromstring(next(f.text for f in emit(compiled.robot) if f.path == "robot.urdf"))  # noqa: S314 (ours)
-    names = [one.get("name") for one in urdf.findall("ros2_control")]
+    names = [element.get("name") for element in urdf.findall("ros2_control")]
     assert names == ["left_motors", "right_motors"]
-    assert [one.get("name") for one in urdf.findall("ros2_control/joint")] == [
+    assert [element.get("name") for element in urdf.findall("ros2_control/joint")] == [
         "left_wrist",
         "right_wrist",
     ]
-    assert [one.get("reference") for one in urdf.findall("gazebo")] == ["left_hand", "right_hand"]
-    assert [one.findtext("frame") for one in urdf.findall("gazebo")] == ["left_foot", "right_foot"]
-    assert {one.findtext("word") for one in urdf.findall("gazebo")} == {"footed"}
-    assert {one.get("name") for one in urdf.iter("material")} == {"left_paint", "right_paint"}
-    kinds = {str(one.get("name")): one.get("type") for one in urdf.findall("joint")}
+    assert [element.get("reference") for element in urdf.findall("gazebo")] == [
+        "left_hand",
+        "right_hand",
+    ]
+    assert [element.findtext("frame") for element in urdf.findall("gazebo")] == [
+        "left_foot",
+        "right_foot",
+    ]
+    assert {element.findtext("word") for element in urdf.findall("gazebo")} == {"footed"}
+    assert {element.get("name") for element in urdf.iter("material")} == {
+        "left_paint",
+        "right_paint",
+    }
+    kinds = {str(element.get("name")): element.get("type") for element in urdf.findall("joint")}
     assert kinds["left_lid"] == kinds["right_lid"] == "floating"
 
 

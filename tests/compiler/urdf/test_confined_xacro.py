@@ -71,7 +71,10 @@ def test_the_kernel_holds_what_passes_the_check_of_names(
 ) -> None:
     monkeypatch.setattr(expand, "PROCESS", "tests.support.unchecked_xacro")
     findings = lint(f'<link name="a${{{expression}}}"/>')
-    assert {one.code for one in findings} <= {"TF209", "TF501"}  # it goes on: system() failed
+    assert {finding.code for finding in findings} <= {
+        "TF209",
+        "TF501",
+    }  # it goes on: system() failed
     assert not Path("made").exists()
 
 
@@ -165,17 +168,17 @@ def test_a_manifest_that_has_no_end_is_not_read(tmp_path: Path) -> None:
     findings = part_of(
         "packages: {p: ../a}\nparts: {arm: {xacro: ../a/arm.xacro, parent: base_link}}"
     )
-    assert [one.code for one in findings] == ["TF001"]
+    assert [finding.code for finding in findings] == ["TF001"]
     write("<link name=\"${xacro.load_yaml('$(find p)/a.yaml')}\"/>", file="arm.xacro")
     findings = part_of("packages: {p: ../a}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}")
-    assert [one.code for one in findings] == ["TF021"]
+    assert [finding.code for finding in findings] == ["TF021"]
 
 
 def test_with_trust_everything_is_read_and_expressions_are_not_confined(tmp_path: Path) -> None:
     (tmp_path / "secret.yaml").write_text("height: high", "utf-8")
     line = "<link name=\"${xacro.load_yaml('../secret.yaml').height}\"/>"
-    assert [one.code for one in lint(line)] == ["TF021"]
-    assert {one.code for one in lint(line, trusts_files=True)} == {"TF209"}
+    assert [finding.code for finding in lint(line)] == ["TF021"]
+    assert {finding.code for finding in lint(line, trusts_files=True)} == {"TF209"}
     assert main(["lint", "--trust", "r.xacro"]) == main(["lint", "--trust", "robot.yaml"]) - 1 == 1
 
 
@@ -235,7 +238,7 @@ def test_a_folder_that_a_robot_calls_a_package_has_to_be_one(
     findings = part_of(
         "packages: {secrets: ../secrets}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}"
     )
-    assert [one.code for one in findings] == codes
+    assert [finding.code for finding in findings] == codes
 
 
 def test_what_xacro_prints_is_shown_without_control_characters(

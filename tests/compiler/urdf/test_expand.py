@@ -131,7 +131,7 @@ def test_each_finding_is_in_the_file_and_line_that_people_have() -> None:
         '<xacro:wheel side="right"><origin rpy="${1 + 1} 0 0"/></xacro:wheel>',
         '<gazebo reference="nobody"/>',
     )
-    assert {(one.code, place(one)) for one in findings} == {
+    assert {(finding.code, place(finding)) for finding in findings} == {
         ("TF721", "r.xacro:3:39"),
         ("TF203", "lib/wheel.xacro:4:58"),
         ("TF203", "r.xacro:5:20"),
@@ -140,7 +140,7 @@ def test_each_finding_is_in_the_file_and_line_that_people_have() -> None:
 
 def test_an_element_that_xacro_names_is_found_where_it_names_it() -> None:
     findings = lint("<xacro:element xacro:name=\"${'li' + 'nk'}\" name=\"a b\"/>")
-    assert {place(one) for one in findings if one.code == "TF501"} == {"r.xacro:2:50"}
+    assert {place(finding) for finding in findings if finding.code == "TF501"} == {"r.xacro:2:50"}
 
 
 HARDWARE = """<xacro:macro name="drive" params="joint">

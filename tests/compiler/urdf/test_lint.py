@@ -59,7 +59,7 @@ def test_each_marked_line_gives_its_findings_and_no_other_line_gives_one(
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", "/nowhere")
     findings = lint_urdf(str(file))
-    assert [(one.span.line, one.code) for one in findings if one.span] == marks(
+    assert [(finding.span.line, finding.code) for finding in findings if finding.span] == marks(
         file.read_text("utf-8")
     )
 
@@ -67,19 +67,21 @@ def test_each_marked_line_gives_its_findings_and_no_other_line_gives_one(
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_each_finding_points_at_the_word_that_is_wrong(file: Path) -> None:
     lines = file.read_text("utf-8").splitlines()
-    for one in lint_urdf(str(file)):
-        assert one.span
-        source_text = lines[one.span.line - 1][one.span.column - 1 : one.span.end_column - 1]
+    for finding in lint_urdf(str(file)):
+        assert finding.span
+        source_text = lines[finding.span.line - 1][
+            finding.span.column - 1 : finding.span.end_column - 1
+        ]
         if source_text.startswith("<!--"):  # a comment may have several lines
             continue
-        assert one.span.line == one.span.end_line
+        assert finding.span.line == finding.span.end_line
         assert source_text.startswith("<") or source_text in re.findall(
-            r"\"([^\"]+)\"", lines[one.span.line - 1]
+            r"\"([^\"]+)\"", lines[finding.span.line - 1]
         )
 
 
 def test_the_nearest_name_is_the_advice() -> None:
-    findings = [one for file in FILES for one in lint_urdf(str(file))]
+    findings = [finding for file in FILES for finding in lint_urdf(str(file))]
     for code, name, near in (
         ("TF720", "orign", "origin"),
         ("TF720", "xzy", "xyz"),
@@ -87,16 +89,16 @@ def test_the_nearest_name_is_the_advice() -> None:
         ("TF701", "no_limt", "no_limit"),
     ):
         (advice,) = {
-            one.help
-            for one in findings
-            if one.code == code and re.search(rf"\b{name}\b", one.message)
+            finding.help
+            for finding in findings
+            if finding.code == code and re.search(rf"\b{name}\b", finding.message)
         }
         assert re.search(rf"\b{near}\b", advice), name
 
 
 def test_advice_is_in_the_words_of_urdf() -> None:
     """Rules know YAML and URDF: whoever wrote XML is told what to write in XML."""
-    advice = {one.code: one.help for file in FILES for one in lint_urdf(str(file))}
+    advice = {finding.code: finding.help for file in FILES for finding in lint_urdf(str(file))}
     for code, element in (("TF401", "<origin "), ("TF704", "<limit ")):
         assert element in advice[code]
     assert not [code for code in RULES if "{" in advice.get(code, "")]
@@ -114,7 +116,7 @@ def test_what_build_writes_has_no_findings(robot: str, tmp_path: Path) -> None:
             root_body = (
                 {"TF712"} if file.path == "robot.urdf" and robot == "autonomous_robot" else set()
             )
-            assert {one.code for one in findings} == root_body
+            assert {finding.code for finding in findings} == root_body
 
 
 BOMB = (
@@ -155,7 +157,7 @@ def test_a_file_is_read_in_the_encoding_that_it_declares(encoding: str, tmp_path
     file.write_bytes(
         f'{head}<robot name="r"><link name="{source_text}"/></robot>'.encode(encoding)
     )
-    assert [(one.code, source_text in one.message) for one in lint_urdf(str(file))] == [
+    assert [(entry.code, source_text in entry.message) for entry in lint_urdf(str(file))] == [
         ("TF501", True)
     ]
     file.write_bytes(file.read_bytes().replace(encoding.encode(), b"UTF-8"))
@@ -178,9 +180,9 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
     (tmp_path / "b.xml").write_text(text, encoding="utf-8")
     by_name = json.loads(run(tmp_path, "a.urdf", "--format", "json").stdout)
     by_option = json.loads(run(tmp_path, "--urdf", "b.xml", "--format", "json").stdout)
-    assert [one | {"file": ""} for one in by_name] != []
-    assert [(one["code"], one["line"]) for one in by_name] == [
-        (one["code"], one["line"]) for one in by_option
+    assert [entry | {"file": ""} for entry in by_name] != []
+    assert [(entry["code"], entry["line"]) for entry in by_name] == [
+        (entry["code"], entry["line"]) for entry in by_option
     ]
     done = run(tmp_path, "a.urdf")
     assert done.returncode == 1
@@ -252,7 +254,7 @@ def test_a_xacro_file_is_expanded_and_places_are_those_in_it(tmp_path: Path) -> 
     file = tmp_path / "r.urdf.xacro"
     file.write_text(XACRO)
     findings = lint_urdf(str(file))
-    assert [one.code for one in findings] == ["TF203"]
+    assert [finding.code for finding in findings] == ["TF203"]
     assert findings[0].span == Span(str(file), 3, 53, 3, 61)
     file.write_text(XACRO.replace("${n}", "${m}", 1))
     (refused,) = lint_urdf(str(file))
@@ -295,9 +297,10 @@ ALLOWED = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
 def test_a_comment_in_a_xacro_file_counts_for_its_line_in_every_expansion(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf.xacro"
     file.write_text(ALLOWED)
-    assert [(one.code, "TF205" in one.message, str(one.span)) for one in lint_urdf(str(file))] == [
-        ("TF012", True, f"{file}:4:40")
-    ]
+    assert [
+        (finding.code, "TF205" in finding.message, str(finding.span))
+        for finding in lint_urdf(str(file))
+    ] == [("TF012", True, f"{file}:4:40")]
 
 
 RATES = 'effort="1" velocity="1"'
@@ -348,8 +351,12 @@ LEVELS = {
 def test_what_readers_take_is_a_warning_and_no_error(what: str, tmp_path: Path) -> None:
     inside, severity = LEVELS[what]
     (tmp_path / "r.urdf").write_text(f'<robot name="r"><link name="base_link"/>{inside}</robot>')
-    findings = [one for one in lint_urdf(str(tmp_path / "r.urdf")) if one.code != "TF706"]
-    assert [one.severity for one in findings] == [severity], [one.message for one in findings]
+    findings = [
+        finding for finding in lint_urdf(str(tmp_path / "r.urdf")) if finding.code != "TF706"
+    ]
+    assert [finding.severity for finding in findings] == [severity], [
+        finding.message for finding in findings
+    ]
 
 
 QUAT = """<robot name="r"{}><link name="base_link"/><link name="a"/><joint name="j" type="fixed">
@@ -386,7 +393,7 @@ def test_xacro_in_a_file_that_is_named_as_a_urdf_is_expanded_too(tmp_path: Path)
     file.write_text(XACRO.replace("base_lnk", "base_link"))
     assert lint_urdf(str(file)) == []
     file.write_text(XACRO)
-    assert [one.code for one in lint_urdf(str(file))] == ["TF203"]
+    assert [finding.code for finding in lint_urdf(str(file))] == ["TF203"]
 
 
 def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> None:
@@ -399,7 +406,7 @@ def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> N
 
 
 def test_a_xacro_file_that_cannot_be_read_is_refused_as_every_other(tmp_path: Path) -> None:
-    assert [one.code for one in lint_urdf(str(tmp_path / "none.xacro"))] == ["TF001"]
+    assert [finding.code for finding in lint_urdf(str(tmp_path / "none.xacro"))] == ["TF001"]
 
 
 TEXTS = [file.read_text("utf-8") for file in FILES]
@@ -441,15 +448,15 @@ def test_any_text_gives_findings_or_a_robot(
 ) -> None:
     file = tmp_path_factory.getbasetemp() / "any.urdf"
     file.write_bytes(text.encode("utf-8", "surrogatepass"))
-    for one in lint_urdf(str(file)):
-        assert one.code != "TF903", one.message
-        assert one.span
-        assert one.span.line >= 1
-        assert one.span.column >= 1
+    for finding in lint_urdf(str(file)):
+        assert finding.code != "TF903", finding.message
+        assert finding.span
+        assert finding.span.line >= 1
+        assert finding.span.column >= 1
 
 
 def test_the_rules_that_are_named_are_known() -> None:
-    assert {one.code for file in FILES for one in lint_urdf(str(file))} >= {
+    assert {finding.code for file in FILES for finding in lint_urdf(str(file))} >= {
         code for code, rule in RULES.items() if rule.of_urdf
     } - {
         "TF206",
@@ -479,17 +486,17 @@ def test_characters_beyond_ascii_cost_no_more_than_others_and_places_are_right_a
     for first in ("u", "ü"):
         text = large(8000, first)
         began = time.process_time()
-        one, *_ = [finding for finding in lint_text(text) if "nmae" in finding.message]
+        finding, *_ = [finding for finding in lint_text(text) if "nmae" in finding.message]
         seconds[first] = time.process_time() - began
-        assert one.span
-        assert text[one.span.column - 1 : one.span.end_column - 1] in {"<joint", "end"}
+        assert finding.span
+        assert text[finding.span.column - 1 : finding.span.end_column - 1] in {"<joint", "end"}
     assert seconds["ü"] < 3 * seconds["u"]
 
 
 def test_a_urdf_as_large_as_that_of_10_000_frames_is_read_and_a_larger_one_is_refused() -> None:
     text = large(2, "x" * 6_000_000)
-    assert "TF008" not in {one.code for one in lint_text(text)}
-    assert [one.code for one in lint_text(large(2, "x" * 16_000_000))] == ["TF008"]
+    assert "TF008" not in {finding.code for finding in lint_text(text)}
+    assert [finding.code for finding in lint_text(large(2, "x" * 16_000_000))] == ["TF008"]
 
 
 def test_a_package_that_is_not_where_it_is_named_is_not_taken_for_a_slip_of_itself() -> None:
@@ -515,8 +522,10 @@ def test_a_number_that_no_robot_has_is_refused() -> None:
     urdf += '<child link="b"/><origin xyz="{} 0 0"/></joint></robot>'
     found = {
         size: {
-            one.code
-            for one in robot_of(read_xml(urdf.format(size), "r"), "r", Packages().asset).findings
+            finding.code
+            for finding in robot_of(
+                read_xml(urdf.format(size), "r"), "r", Packages().asset
+            ).findings
         }
         for size in ("1e29", "1e31", "-1e31")
     }

@@ -160,15 +160,15 @@ def test_nothing_is_emitted_that_is_not_the_robot(
     def wrong(*given: Any, **more: Any) -> Any:
         kept = work_emit(*given, **more)
         return tuple(
-            type(one)(
-                one.path,
+            type(file)(
+                file.path,
                 (
-                    one.text.replace('xyz="0 0 ', 'xyz="0 1e-9 ')
-                    if one.path.endswith("urdf")
-                    else one.text
+                    file.text.replace('xyz="0 0 ', 'xyz="0 1e-9 ')
+                    if file.path.endswith("urdf")
+                    else file.text
                 ),
             )
-            for one in kept
+            for file in kept
         )
 
     work_emit = emit

@@ -71,10 +71,10 @@ def generated(seed: int, reader: str) -> Robot:
 
 
 def examples() -> list[Path]:
-    several = {
+    with_several_robots = {
         "two_rovers"
     }  # robots beside each other, with joints of one name; rover.yaml is one of them
-    return sorted(file for file in ROBOTS.rglob("*.yaml") if file.stem not in several)
+    return sorted(file for file in ROBOTS.rglob("*.yaml") if file.stem not in with_several_robots)
 
 
 def source_text(robot: Robot) -> dict[str, str]:

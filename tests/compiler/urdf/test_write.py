@@ -217,7 +217,7 @@ def test_a_name_that_xml_takes_differently_never_reaches_a_file_and_would_be_esc
 ) -> None:
     text = HEAD + f"links: {{base_link: {{}}, {json.dumps(name)}: {{parent: base_link}}}}\n"
     compiled = compile_robot(text, "r.yaml", library())
-    assert [one.code for one in compiled.errors] == ["TF501"]
+    assert [finding.code for finding in compiled.errors] == ["TF501"]
     assert compiled.robot
     read = xml_of(urdf(compiled.robot)[0])
     assert [link.get("name") for link in read.iter("link")] == ["base_link", name]

@@ -115,10 +115,11 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
     found = expanded(tmp_path / "robot.urdf.xacro", {"prefix": "left_"})
     (control,) = found.findall("ros2_control")
     names = [
-        one.get("name") for one in (control, *control.findall("joint"), *control.findall("gpio"))
+        element.get("name")
+        for element in (control, *control.findall("joint"), *control.findall("gpio"))
     ]
     assert names == ["left_motors", "left_joint", "left_lamp"]
-    assert [one.text for one in control.iter("param")] == [
+    assert [element.text for element in control.iter("param")] == [
         "$HOME/$(cwd)",
         "left_hand",
         "joint",
@@ -130,12 +131,16 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
         str(gazebo.findtext(f"plugin/{tag}")).strip() for tag in ("frame", "joint", "text", "cost")
     ] == ["left_base_link", "left_joint", "base_link of joint $(eval 1)", "$5 $$(x)"]
     (drive,) = found.findall("transmission")
-    assert [one.get("name") for one in drive.iter()] == ["left_drive", "left_joint", "left_motor"]
+    assert [element.get("name") for element in drive.iter()] == [
+        "left_drive",
+        "left_joint",
+        "left_motor",
+    ]
     assert [mesh.get("filename") for mesh in found.iter("mesh")] == [
         "meshes/a.stl",
         "package://x/$(y)/$$(z).stl",
     ]
-    assert [one.get("name") for one in found.iter("material")] == [
+    assert [element.get("name") for element in found.iter("material")] == [
         "left_paint"
     ]  # another robot has another paint
 

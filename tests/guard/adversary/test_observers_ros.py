@@ -60,5 +60,5 @@ def test_a_flood_is_named_and_takes_bounded_memory(
             except psutil.TimeoutExpired:
                 continue
     text = output.read_text(encoding="utf-8")
-    assert all(one in text for one in expected), text[-2000:]
+    assert all(edge in text for edge in expected), text[-2000:]
     assert most < MOST_BYTES

@@ -48,9 +48,9 @@ def robot(
 ) -> Iterator[Robot]:
     with running(
         tmp_path_factory.mktemp(request.param), request.param, {"idle": Child(["sleep", "600"])}
-    ) as one:
-        one.says("tree complete")
-        yield one
+    ) as running_robot:
+        running_robot.says("tree complete")
+        yield running_robot
 
 
 @pytest.fixture
@@ -62,8 +62,8 @@ def rogue(robot: Robot) -> Iterator[Callable[..., subprocess.Popen[str]]]:
         return started[-1]
 
     yield start
-    for one in started:
-        robot.stop(one)
+    for process in started:
+        robot.stop(process)
 
 
 def accused(robot: Robot, after: int) -> set[int]:
@@ -90,15 +90,15 @@ def test_a_node_is_named_with_its_process_and_the_owner_is_not(
 ) -> None:
     name, namespace, who = NODES[kind]
     after = len(robot.lines())
-    one = rogue(node(name, OTHER_X, "map odom", namespace=namespace))
+    started = rogue(node(name, OTHER_X, "map odom", namespace=namespace))
     robot.says("error[TF801]", "map → odom", f"published by {who}", after=after)
-    robot.says("note: ", f"pid {one.pid}", after=after)
+    robot.says("note: ", f"pid {started.pid}", after=after)
     heard = PlainListener().until("odom", OWNER_X)
     assert set(heard) <= {OWNER_X, OTHER_X}
     robot.says("cannot be held back", after=after)
-    robot.stop(one)
+    robot.stop(started)
     robot.says("over", "map → odom", after=after)
-    assert accused(robot, after) == {one.pid}
+    assert accused(robot, after) == {started.pid}
     assert "owner: idle" not in robot.output_after(after), (
         "the plan's idle has nothing to do with it"
     )
@@ -110,11 +110,11 @@ def test_a_program_of_another_dds_is_named_as_what_it_is_and_no_node_is_accused(
 ) -> None:
     pytest.importorskip("cyclonedds")
     after = len(robot.lines())
-    one = rogue(foreign(OTHER_X, "map odom"))
+    started = rogue(foreign(OTHER_X, "map odom"))
     robot.says("[TF801]", "map → odom", "a DDS program that is no ROS node", after=after)
     PlainListener().until("odom", OTHER_X)
     robot.says("cannot be held back", after=after)
-    robot.stop(one)
+    robot.stop(started)
     assert accused(robot, after) == set()
     robot.says("over", "map → odom", after=after)
 
@@ -128,10 +128,10 @@ def test_a_name_that_is_no_text_hides_nothing_of_its_message(
         [SentTransform(0, "odom", "bad_name", *rest), SentTransform(0, "map", "odom", *rest)]
     )
     odd = data.replace(b"bad_name", b"b\xffd_name").hex()
-    one = rogue(node("odd", OTHER_X, f"hex:{odd}"))
+    started = rogue(node("odd", OTHER_X, f"hex:{odd}"))
     robot.says("error[TF801]", "map → odom", "/odd", after=after)
-    robot.says("note: ", f"pid {one.pid}", after=after)
-    robot.stop(one)
+    robot.says("note: ", f"pid {started.pid}", after=after)
+    robot.stop(started)
     robot.says("over", "map → odom", after=after)
 
 

@@ -71,9 +71,9 @@ def robot(
     for name, text in SETUPS.items():
         (folder / f"{name}.sh").write_text(f"{text}\n", encoding="utf-8")
     (folder / "own.xml").write_text("<dds><profiles/></dds>", encoding="utf-8")
-    with running(folder, request.param, CHILDREN) as one:
-        one.says("base_link", "live")
-        yield one
+    with running(folder, request.param, CHILDREN) as running_robot:
+        running_robot.says("base_link", "live")
+        yield running_robot
 
 
 def pid_in(line: str) -> int:

@@ -358,7 +358,9 @@ BY_PLAN: dict[str, tuple[TreeHistory, str, list[str]]] = {
 @pytest.mark.parametrize("case", BY_PLAN)
 def test_with_a_plan_what_differs_from_it_is_found(case: str) -> None:
     history, code, names = BY_PLAN[case]
-    (finding,) = [one for one in diagnose(history.observed(plan=sound_plan())) if one.code == code]
+    (finding,) = [
+        entry for entry in diagnose(history.observed(plan=sound_plan())) if entry.code == code
+    ]
     expect(finding, code, *names)
 
 
@@ -375,7 +377,7 @@ def test_of_a_frame_with_very_many_parents_some_are_named() -> None:
     history = TreeHistory()
     for index in range(60):
         history.fixed(f"parent{index:02} cup")
-    (finding,) = [one for one in diagnose(history.observed()) if one.code == "TF802"]
+    (finding,) = [entry for entry in diagnose(history.observed()) if entry.code == "TF802"]
     expect(finding, "TF802", "cup", "60", "parent00 (from /static)", "parent01 (from /static)")
     assert len(finding.notes) < 10
 
@@ -474,10 +476,14 @@ def test_of_many_other_settings_some_are_named_and_some_processes_of_each() -> N
         RosProcess(pid, "nav", {"ROS_DOMAIN_ID": str(domain)})
         for pid, domain in enumerate(domains, 100)
     )
-    found = [one for one in diagnose(TreeState(SECONDS, processes=started)) if one.code == "TF908"]
+    found = [
+        finding
+        for finding in diagnose(TreeState(SECONDS, processes=started))
+        if finding.code == "TF908"
+    ]
     assert len(found) == MOST_SETTINGS == 3
     many = diagnose(TreeState(SECONDS, processes=started[: MOST_PROCESSES + 2]))
-    [of_one] = [one for one in many if one.code == "TF908"]
+    [of_one] = [finding for finding in many if finding.code == "TF908"]
     assert len(of_one.notes) == MOST_PROCESSES + 1
     assert of_one.notes[-1].message == "and 2 more"
 
@@ -496,7 +502,7 @@ def test_processes_with_other_settings_cannot_be_heard_and_why_is_reported() -> 
     observed = TreeState(1.0, settings={**ours, "RMW_IMPLEMENTATION": "b"})
     other = RosProcess(9, "nav", {**ours, "ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"})
     [finding] = [
-        one for one in diagnose(replace(observed, processes=(other,))) if one.code == "TF908"
+        entry for entry in diagnose(replace(observed, processes=(other,))) if entry.code == "TF908"
     ]
     names = (
         "ROS_DOMAIN_ID=8",
@@ -553,7 +559,7 @@ def test_two_publishers_of_one_node_are_each_reported_with_their_edges() -> None
     tree = TreeHistory().knows(b"d", b"e").fixed("base_link laser")
     for edge, gid in (("odom base_link", b"d"), ("base_link arm", b"e")):
         tree.moving(edge, gid, stamp=late(-0.5))
-    findings = [one for one in diagnose(tree.observed()) if one.code == "TF835"]
+    findings = [finding for finding in diagnose(tree.observed()) if finding.code == "TF835"]
     assert len(findings) == 2
 
 
@@ -561,5 +567,5 @@ def test_two_publishers_of_one_node_are_each_reported_with_their_edges() -> None
 def test_a_flood_is_reported_also_of_a_publisher_that_has_no_name(node: str) -> None:
     state = sound_tree().observed(beyond={b"f": 7})
     state = replace(state, publishers=(*state.publishers, Publisher(b"f", node, static=False)))
-    (finding,) = [one for one in diagnose(state) if one.code == "TF853"]
+    (finding,) = [entry for entry in diagnose(state) if entry.code == "TF853"]
     assert finding.message.startswith(node or NAMELESS)

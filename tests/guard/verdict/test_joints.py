@@ -57,9 +57,9 @@ def sender(node: str, *joints: str, first_s: float = 0.0, last_s: float = 10.0) 
 )
 def test_a_joint_has_one_sender(senders: list[SentJoints], names: list[str]) -> None:
     findings = list(find_sent_twice(senders))
-    assert [one.code for one in findings] == ["TF860"] * bool(names)
-    assert all(name in one.message for one in findings for name in names)
-    assert all("elbow" not in one.message for one in findings)
+    assert [finding.code for finding in findings] == ["TF860"] * bool(names)
+    assert all(name in finding.message for finding in findings for name in names)
+    assert all("elbow" not in finding.message for finding in findings)
 
 
 def test_a_joint_that_the_robot_lacks_is_named_with_the_nearest() -> None:
@@ -88,7 +88,7 @@ def test_a_joint_that_follows_another_needs_no_state_also_where_the_plan_describ
         state = sound_tree().observed(
             graph=(heard,), plan=plan, sent_joints=(sender("/wheels", "wheel"),)
         )
-        assert ("TF844" in {one.code for one in diagnose(state)}) is expected
+        assert ("TF844" in {finding.code for finding in diagnose(state)}) is expected
 
 
 def test_doctor_judges_the_topic_of_this_robot_alone() -> None:
@@ -98,4 +98,4 @@ def test_doctor_judges_the_topic_of_this_robot_alone() -> None:
     other = TopicState("/else/states", heard.type, heard.publishers, heard.readers)
     for topic, expected in ((heard, True), (other, False)):
         state = sound_tree().observed(graph=(topic,), moving_joints=joints, sent_joints=senders)
-        assert ("TF860" in {one.code for one in diagnose(state)}) is expected
+        assert ("TF860" in {finding.code for finding in diagnose(state)}) is expected

@@ -116,7 +116,7 @@ def test_a_nominal_frame_may_be_calibrated_and_an_exact_one_only_rounded(
     guard.knows("/front/front")
     parent, child = names.split()
     guard.hears((parent, child, moved(LENS if child == "lens" else OPTICAL, metres, angle_deg)))
-    assert [one.code for one in guard.says()] == ["TF828"] * reported
+    assert [finding.code for finding in guard.says()] == ["TF828"] * reported
 
 
 def test_all_frames_of_one_driver_are_one_finding_that_is_reported_once() -> None:
@@ -124,9 +124,9 @@ def test_all_frames_of_one_driver_are_one_finding_that_is_reported_once() -> Non
     guard.knows("/front/front")
     for _ in range(3):
         guard.hears(("link", "lens", moved(LENS, 0.1)), ("lens", "optical", moved(OPTICAL, 0.1)))
-    (one,) = guard.says()
+    (finding,) = guard.says()
     expect(
-        one,
+        finding,
         "TF828",
         "lens in link",
         "/front/front",
@@ -135,11 +135,14 @@ def test_all_frames_of_one_driver_are_one_finding_that_is_reported_once() -> Non
         "1 more",
         "optical in lens",
     )
-    assert ("xyz 0 -0.05 0.1 m" in one.message, "xyz 0 0 0.1 m" in one.notes[0].message) == (
+    assert (
+        "xyz 0 -0.05 0.1 m" in finding.message,
+        "xyz 0 0 0.1 m" in finding.notes[0].message,
+    ) == (
         True,
         True,
     )
-    assert one.severity == "warning"
+    assert finding.severity == "warning"
     guard.hears(("link", "lens", moved(LENS, 0.2)))
     assert guard.says() == []
 
@@ -209,6 +212,6 @@ def test_a_fixed_frame_of_another_owner_is_where_the_robot_declares_it(
     declared = next(edge.pose for edge in PLAN.edges if edge.child == child)
     guard.hears((parent, child, moved(declared, metres)))
     findings = guard.says()
-    assert [one.code for one in findings] == codes
-    for one in findings:
-        expect(one, "TF846", "arm in base", "/arm", "1 m")
+    assert [finding.code for finding in findings] == codes
+    for finding in findings:
+        expect(finding, "TF846", "arm in base", "/arm", "1 m")

@@ -170,7 +170,7 @@ def test_the_stamps_of_simulated_time_are_not_judged(plan: Plan, tree: Tree) -> 
 
 def test_a_loop_is_reported_of_the_tree(plan: Plan, tree: Tree) -> None:
     tree.sent["odom"] = {"parent": "laser", "node": OTHER, "rate": 10.0}
-    assert "TF820" in {one.code for one in tree.reported(plan)}
+    assert "TF820" in {finding.code for finding in tree.reported(plan)}
 
 
 def test_two_senders_of_a_joint_and_an_unknown_joint_are_reported_once(
@@ -180,7 +180,7 @@ def test_two_senders_of_a_joint_and_an_unknown_joint_are_reported_once(
         SentJoints("/joint_states", "/arm", frozenset({"wheel_joint"}), 0, 10 * S),
         SentJoints("/joint_states", OTHER, frozenset({"wheel_joint", "weel"}), 0, 10 * S),
     )
-    assert [one.code for one in tree.reported(plan)] == ["TF860", "TF861"]
+    assert [finding.code for finding in tree.reported(plan)] == ["TF860", "TF861"]
 
 
 #: What is sent of a frame otherwise than planned, None: nothing; and what the finding is and
@@ -281,7 +281,7 @@ def test_an_edge_that_nobody_declared_counts_as_the_policy_says(
 ) -> None:
     tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
     plan = replace(plan, guard=GuardPolicy(unknown_edges=policy))
-    assert [(one.code, one.severity) for one in tree.reported(plan)] == (
+    assert [(finding.code, finding.severity) for finding in tree.reported(plan)] == (
         [("TF803", severity)] if severity else []
     )
 
@@ -346,9 +346,9 @@ def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -
     ]
     tree.observer.take_graph([*known, Publisher(b"twin", DRIVE, static=False)])
     [finding] = [
-        one
+        entry
         for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE)
-        for one in verdict.findings
+        for entry in verdict.findings
     ]
     expect(finding, "TF801", "odom → base", f"another {DRIVE}", f"drive ({DRIVE})")
 
@@ -386,9 +386,9 @@ def test_a_publisher_that_has_left_is_reported(plan: Plan, tree: Tree) -> None:
     tree.observer.take_graph([Publisher(STATIC.encode(), STATIC, static=True)])
     tree.observer.take_graph([Publisher(node.encode(), node, static=False) for node in present])
     [finding] = [
-        one
+        entry
         for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE)
-        for one in verdict.findings
+        for entry in verdict.findings
     ]
     expect(finding, "TF804", "static (/rover/static)", "base → laser")
 
@@ -414,18 +414,18 @@ def test_where_a_simulation_goes_slower_than_the_time_of_day_edges_may_come_as_m
     rarely = Tree()
     rarely.sent["base"] |= {"rate": 5.0}
     findings = rarely.reported(replace(plan, ros=RosSettings(clock="sim")))
-    assert [one.code for one in findings] == ["TF805"]
+    assert [finding.code for finding in findings] == ["TF805"]
 
 
 def test_a_value_is_compared_also_where_one_before_it_was_refused(plan: Plan, tree: Tree) -> None:
     tree.send("laser", "base", STATIC, Pose((float("nan"), 0.0, 0.0)))
     tree.sent["laser"]["pose"] = Pose((0.0, 0.0, 0.4))
-    assert [one.code for one in tree.reported(plan)] == ["TF831", "TF846"]
+    assert [finding.code for finding in tree.reported(plan)] == ["TF831", "TF846"]
 
 
 def test_a_planned_frame_that_is_published_in_itself_is_missing(plan: Plan, tree: Tree) -> None:
     tree.sent["laser"]["parent"] = "laser"
-    assert [one.code for one in tree.reported(plan)] == ["TF821", "TF811"]
+    assert [finding.code for finding in tree.reported(plan)] == ["TF821", "TF811"]
 
 
 def test_a_publisher_that_stays_without_a_name_is_blamed_and_one_that_has_just_come_is_not(
@@ -453,7 +453,13 @@ def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan:
     for child, words in tree.sent.items():
         tree.send(child, **words)
     tree.observer.take_graph(
-        [*publishers, *(replace(one, static=True, gid=one.gid + b"s") for one in publishers)]
+        [
+            *publishers,
+            *(
+                replace(publisher, static=True, gid=publisher.gid + b"s")
+                for publisher in publishers
+            ),
+        ]
     )
     verdicts = verify(plan, {TOPICS: tree.observer}, TOLERANCE)
     assert [finding.code for verdict in verdicts for finding in verdict.findings] == []
@@ -474,7 +480,7 @@ def test_a_driver_far_from_its_preset_is_reported_and_strangers_are_not_compared
     expect(finding, "TF828", "lens", "camera", CAMERA, "45 mm", "realsense/d435i")
     tree = Tree()
     tree.send("lens", "camera", OTHER, Pose((0.0, 0.06, 0.0)))
-    assert [one.code for one in tree.reported(plan)] == ["TF801"]
+    assert [entry.code for entry in tree.reported(plan)] == ["TF801"]
 
 
 def test_of_a_recording_nothing_is_advised_that_only_a_running_robot_can_do(
@@ -484,7 +490,7 @@ def test_of_a_recording_nothing_is_advised_that_only_a_running_robot_can_do(
     tree.sent["base"]["until"] = 5.0
     for words in tree.sent.values():
         words["gid"] = None
-    found = {one.code: one.help for one in tree.reported(plan, graph=False)}
+    found = {finding.code: finding.help for finding in tree.reported(plan, graph=False)}
     assert found == {"TF804": "", "TF811": ""}
 
 
@@ -528,7 +534,7 @@ def test_what_a_strict_guard_passes_on_is_its_owners(plan: Plan) -> None:
     for sent in tree.sent.values():
         sent["node"] = "/rover/guard"
     assert tree.reported(strict) == []
-    assert {one.code for one in tree.reported(plan)} == {"TF801"}
+    assert {finding.code for finding in tree.reported(plan)} == {"TF801"}
 
 
 @pytest.mark.parametrize("metres", [0.012, 0.1, 0.7, 3.3])

@@ -168,7 +168,7 @@ def test_an_interrupt_during_the_start_ends_silently_too(start: Make, write: Mak
     process = start("static", file, "static", PYTHONVERBOSE="1")
     imports = ("import 'tfcompose.launcher.publishers.description'", "import 'rclpy'")
     end = time.monotonic() + UNTIL_S
-    while not any(one in line for line in process.errors for one in imports):
+    while not any(module in line for line in process.errors for module in imports):
         assert time.monotonic() < end, "it loads nothing"
         time.sleep(0.001)
     code = process.end(signal.SIGINT)

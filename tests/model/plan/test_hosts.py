@@ -104,8 +104,8 @@ def test_each_machine_of_a_strict_plan_hears_the_other_guard_and_has_a_fence() -
         {"base_link": "/drive", "lidar": "/tfcompose_static", "arm": "/tfcompose_guard_jetson"},
     ]
     assert [partition_of(share) for share in shares] == ["tfc_rover.jetson", "tfc_rover"]
-    for one in (plan, *shares):
-        assert relays_of(one) == {"/tfcompose_guard", "/tfcompose_guard_jetson"}
+    for each_plan in (plan, *shares):
+        assert relays_of(each_plan) == {"/tfcompose_guard", "/tfcompose_guard_jetson"}
 
 
 def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_others() -> None:
@@ -125,7 +125,7 @@ def test_a_share_is_saved_and_read_and_has_a_folder_of_its_own(tmp_path: Path) -
     assert isinstance(main, Plan)
     assert read_plan(write_plan(jetson), "plan.json") == jetson
     assert read_plan(write_plan(main), "plan.json") == main
-    assert [runtime_dir_of(one, env).name for one in (plan, main, jetson)] == [
+    assert [runtime_dir_of(share, env).name for share in (plan, main, jetson)] == [
         "rover@7",
         "rover@7",
         "rover.jetson@7",

@@ -45,8 +45,8 @@ WRONG: dict[str, Callable[[dict[str, Any]], Any]] = {
     "an escape sequence as a variable": changed(env={"\x1b[2J": "1"}),
     "a wait for nobody": changed(after={"nobody": "ready"}),
     "processes that wait for each other": lambda plan: [
-        one.update(after={other["name"]: "ready"})
-        for one, other in permutations(plan["processes"][:2])
+        process.update(after={other["name"]: "ready"})
+        for process, other in permutations(plan["processes"][:2])
     ],
     "lists as deep as JSON is read": lambda plan: plan.update(more=deep(900), robot="\ud800"),
     "an owner that is no process": lambda plan: plan["edges"][0].update(owner="nobody"),
@@ -71,8 +71,8 @@ def test_what_no_build_writes_is_refused() -> None:
         with pytest.raises(RejectedError) as rejected:
             read_plan(plan_with(change), "plan.json")
         findings = rejected.value.findings
-        assert {one.code for one in findings} == {"TF902"}, name
-        assert all(one.message.isprintable() for one in findings), name
+        assert {finding.code for finding in findings} == {"TF902"}, name
+        assert all(finding.message.isprintable() for finding in findings), name
 
 
 def test_all_that_is_wrong_is_found_at_once() -> None:

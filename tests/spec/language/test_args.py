@@ -49,7 +49,11 @@ def robot(compiled: Compiled) -> Robot:
 
 
 def places(compiled: Compiled) -> list[tuple[str, str, int]]:
-    return [(one.code, one.span.file, one.span.line) for one in compiled.findings if one.span]
+    return [
+        (finding.code, finding.span.file, finding.span.line)
+        for finding in compiled.findings
+        if finding.span
+    ]
 
 
 CAMERAS = """\
@@ -97,7 +101,7 @@ def test_a_wrong_value_is_a_finding_that_names_what_can_be(
     assert names in finding.message + finding.help
     assert finding.span
     assert (
-        finding.span.file == "".join(f"{one}:={value}" for one, value in given.items())
+        finding.span.file == "".join(f"{text}:={value}" for text, value in given.items())
         or finding.span.file == "r.yaml"
     )
 
@@ -131,7 +135,7 @@ processes:
     params: {n: "${args.n}", sim: "${args.sim}", word: "${args.word}", twice: "${args.mast * 2}"}
     required: ${args.sim}
 """
-    (process,) = [one for one in robot(built(text)).processes if one.name == "p"]
+    (process,) = [process for process in robot(built(text)).processes if process.name == "p"]
     assert process.argv == ("x", "2", "true", "a_007", "0.3")
     assert process.ros_nodes[0].params == {"n": 2, "sim": True, "word": "007", "twice": 0.6}
     assert process.required is True
@@ -145,11 +149,15 @@ processes:
   cam_${i}: {for: {i: "${range(args.n)}"}, run: [c], after: {"cam_${i - 1}": ready}}
   drive: {run: [d], after: {world: ready, cam_7: ready, cam_1: ready}}
 """
-    made = {one.name: one.after for one in robot(built(text)).processes if one.kind == "run"}
+    made = {
+        process.name: process.after
+        for process in robot(built(text)).processes
+        if process.kind == "run"
+    }
     assert made == {"cam_0": {}, "cam_1": {"cam_0": "ready"}, "drive": {"cam_1": "ready"}}
-    assert "world" in {one.name for one in robot(built(text, {"sim": "true"})).processes}
+    assert "world" in {process.name for process in robot(built(text, {"sim": "true"})).processes}
     wrong = built(text.replace("{world: ready", "{wrld: ready"))
-    assert [one.code for one in wrong.errors] == ["TF813"]
+    assert [finding.code for finding in wrong.errors] == ["TF813"]
 
 
 @pytest.mark.parametrize(
@@ -172,7 +180,7 @@ def test_a_condition_or_a_loop_that_cannot_be_decided_is_one_finding(
     compiled = built(
         f"frames:\n  {entry}\nargs: {{n: 1}}\nvars: {{v: '${{args.n}}'}}\nxml: '${{v}}'\n"
     )
-    found = [one for one in places(compiled) if one[0] == "TF105"]
+    found = [place for place in places(compiled) if place[0] == "TF105"]
     assert found == [("TF105", "r.yaml", line)]
 
 
@@ -208,7 +216,7 @@ profiles:
     changing = built(
         "args: {sim: true}\nprofiles:\n  demo: {when: '${args.sim}', args: {sim: false}}\n"
     )
-    assert [one.code for one in changing.errors] == ["TF107"]
+    assert [finding.code for finding in changing.errors] == ["TF107"]
 
 
 def test_a_part_is_given_its_arguments_and_an_including_file_sets_defaults() -> None:
@@ -247,11 +255,11 @@ processes: {p: {run: [x, "dev_${env(PORT)}"]}}
     other = plan_of(robot(built(text, environment={"PORT": "0.50", "MAST": "1 m"})))
     assert other.edges[0].pose.xyz == (0, 0, 1)
     assert other.spec_digest != plan.spec_digest
-    assert [one.code for one in built(text).errors] == ["TF105"]
+    assert [finding.code for finding in built(text).errors] == ["TF105"]
 
 
 def test_an_argument_that_nothing_uses_is_named() -> None:
-    assert [one.code for one in built("args: {n: 1}\n").findings] == ["TF504"]
+    assert [finding.code for finding in built("args: {n: 1}\n").findings] == ["TF504"]
 
 
 @pytest.mark.parametrize(
@@ -286,7 +294,7 @@ def test_a_process_waits_on_for_one_of_a_part_that_a_loop_makes() -> None:
         " plan: {run: [plan], after: {arm_1/drive: started, other_1: started}}\n"
     )
     made = robot(built(text, files={"arm.yaml": arm}))
-    (plan,) = [one for one in made.processes if one.name == "plan"]
+    (plan,) = [process for process in made.processes if process.name == "plan"]
     assert plan.after == {"arm_1/drive": "started"}
 
 
@@ -295,7 +303,7 @@ def test_loops_in_each_other_make_no_more_entries_than_one_may() -> None:
         'frames: {"f_${i}_${j}": {for: {i: "${range(200)}", j: "${range(200)}"}, parent:'
         " base_link}}\n"
     )
-    assert [one.code for one in built(text).errors] == ["TF105"]
+    assert [finding.code for finding in built(text).errors] == ["TF105"]
 
 
 def test_what_a_profile_replaced_in_an_entry_that_a_loop_makes_is_noted() -> None:
@@ -303,7 +311,9 @@ def test_what_a_profile_replaced_in_an_entry_that_a_loop_makes_is_noted() -> Non
         "frames: {'f_${i}': {for: {i: [1]}, parent: base_link, xyz: [1, 0, 0]}}\n"
         "profiles: {high: {frames: {'f_${i}': {xyz: [900, 0, 0]}}}}\n"
     )
-    (far,) = [one for one in built(text, profiles=("high",)).findings if one.code == "TF414"]
+    (far,) = [
+        finding for finding in built(text, profiles=("high",)).findings if finding.code == "TF414"
+    ]
     assert far.span
     assert (far.span.line, [note.span.line for note in far.notes if note.span]) == (5, [4])
 
@@ -319,5 +329,7 @@ def test_a_parameter_has_the_type_of_its_argument_whatever_the_form_of_the_value
         ' "${args.rate}"}}}\n'
     )
     for given in ({}, {"rate": "7"}):
-        (process,) = (one for one in robot(built(text, given)).processes if one.name == "n")
+        (process,) = (
+            process for process in robot(built(text, given)).processes if process.name == "n"
+        )
         assert type(process.ros_nodes[0].params["rate"]) is type_

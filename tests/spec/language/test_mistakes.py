@@ -126,7 +126,7 @@ def test_where_a_limit_is_refused_the_default_one_judges_nothing(tmp_path: Path)
         (tmp_path / "robot.yaml").write_text(SHAPE % "color: red" + sensor + rules, "utf-8")
         printed = tfcompose_in(tmp_path, "lint").stdout
         assert {
-            one.partition("]")[0] for one in printed.split("[")[1:] if one.startswith("TF")
+            part.partition("]")[0] for part in printed.split("[")[1:] if part.startswith("TF")
         } == {code}, printed
 
 

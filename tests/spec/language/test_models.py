@@ -112,7 +112,7 @@ def test_an_error_of_a_kind_that_nobody_foresaw_is_worded_without_pydantic_s_eng
 
     made, refusals = read(Later, {"when": 5})
     assert made is None
-    assert [(one.code, one.path, one.message) for one in refusals] == [
+    assert [(refusal.code, refusal.path, refusal.message) for refusal in refusals] == [
         ("TF103", ("when",), "5 cannot stand here")
     ]
 

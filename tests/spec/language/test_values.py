@@ -38,7 +38,7 @@ def value_of(source_text: str, variables: str = "{}") -> Any:
 
 
 def codes_of(text: str) -> list[str]:
-    return [one.code for one in validated(text).findings]
+    return [finding.code for finding in validated(text).findings]
 
 
 EXACT = {
@@ -264,9 +264,9 @@ def test_variables_that_need_each_other_are_one_finding_that_shows_the_circle() 
     findings = validated(
         'vars: {a: "${b}", b: "${c}", c: "${a}"}\nframes: {f: {parent: b, xyz: ["${a}", 0, 0]}}\n'
     ).findings
-    (one,) = findings
-    assert one.code == "TF105"
-    assert "a → b → c → a" in one.message
+    (finding,) = findings
+    assert finding.code == "TF105"
+    assert "a → b → c → a" in finding.message
 
 
 def test_a_text_does_not_grow_without_bound() -> None:
@@ -400,9 +400,9 @@ def test_a_joint_limit_takes_the_units_of_its_motion(
 
 @pytest.mark.parametrize("name", ["pi", "a b", "ü", "1a", "build_dir", "params_file", ""])
 def test_a_variable_that_no_expression_can_mean_is_refused_where_it_stands(name: str) -> None:
-    (one,) = validated(f"vars: {{{name!r}: 3}}\nframes: {{f: {{}}}}\n").findings
-    assert one.code == "TF105"
-    assert (one.span and one.span.line) == 3
+    (finding,) = validated(f"vars: {{{name!r}: 3}}\nframes: {{f: {{}}}}\n").findings
+    assert finding.code == "TF105"
+    assert (finding.span and finding.span.line) == 3
 
 
 @pytest.mark.parametrize("what", ["frame(f)", "file(maps/a.yaml)", "frame(f) + 1"])
@@ -410,16 +410,16 @@ def test_a_variable_that_no_expression_can_mean_is_refused_where_it_stands(name:
     "where", ["vars: {a: %s}", "frames: {f: {parent: %s}}", "base: %s", "calibrations: [%s]"]
 )
 def test_what_only_processes_can_use_is_refused_elsewhere(what: str, where: str) -> None:
-    (one,) = validated(where % f"'${{{what}}}'" + "\n").findings
-    assert one.code == "TF105"
-    assert one.message.endswith("is for processes only")
-    assert "run, params" in one.help
+    (finding,) = validated(where % f"'${{{what}}}'" + "\n").findings
+    assert finding.code == "TF105"
+    assert finding.message.endswith("is for processes only")
+    assert "run, params" in finding.help
 
 
 @pytest.mark.parametrize("what", ["frame(f) + 1", "2 * file(a/b.yaml)", "frame(${a})"])
 def test_in_a_process_they_stand_alone(what: str) -> None:
     findings = validated(f"processes: {{p: {{run: [x, '${{{what}}}']}}}}\n").findings
-    assert {one.code for one in findings} == {"TF105"}
+    assert {finding.code for finding in findings} == {"TF105"}
 
 
 def test_a_computed_number_is_a_word_of_a_command_and_of_its_environment() -> None:

@@ -125,7 +125,8 @@ def test_an_overlay_can_bring_a_profile() -> None:
 def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
     findings = compose(load("a: {x: 1}\n", "f"), [], [load("a: {x: 1}\n", "o")]).findings
     assert [
-        (one.code, str(one.span), [str(note.span) for note in one.notes]) for one in findings
+        (finding.code, str(finding.span), [str(note.span) for note in finding.notes])
+        for finding in findings
     ] == [("TF014", "o:1:8", ["f:1:8"])]
 
 
@@ -141,8 +142,8 @@ def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
 def test_an_overlay_that_is_empty_where_something_stands_is_a_finding(
     overlay: str, place: str
 ) -> None:
-    (one,) = compose(load("a: {x: 1, b: {y: 2}}\n", "f"), [], [load(overlay, "o")]).findings
-    assert (one.code, str(one.span)) == ("TF014", place)
+    (finding,) = compose(load("a: {x: 1, b: {y: 2}}\n", "f"), [], [load(overlay, "o")]).findings
+    assert (finding.code, str(finding.span)) == ("TF014", place)
 
 
 def test_an_overlay_may_say_which_language_it_is_in_and_bring_what_is_new_and_empty() -> None:
@@ -161,7 +162,7 @@ def test_an_included_file_may_be_completed_by_what_stands_there_already() -> Non
 def test_a_setting_cannot_include() -> None:
     with pytest.raises(RejectedError) as refused:
         set_value("include=[a.yaml]")
-    assert [one.code for one in refused.value.findings] == ["TF016"]
+    assert [finding.code for finding in refused.value.findings] == ["TF016"]
 
 
 def test_true_is_not_one() -> None:

@@ -81,7 +81,7 @@ def test_every_integer_reads_back_as_itself(value: int) -> None:
 )
 def test_what_is_not_finite_is_a_finding_at_its_place(number: str) -> None:
     findings = load(f"a: {number}\n", "f").findings
-    assert [(one.code, one.span) for one in findings] == [
+    assert [(finding.code, finding.span) for finding in findings] == [
         ("TF007", Span("f", 1, 4, 1, 4 + len(number)))
     ]
     assert number[:40] in findings[0].message
@@ -103,7 +103,9 @@ def test_parameters_of_nodes_may_be_infinite(around: str) -> None:
         assert not source.findings
         assert repr(value) in repr(source.data)
     assert "nan" in repr(load(around.replace("NUMBER", ".nan"), "f").data)
-    assert [one.code for one in load(around.replace("NUMBER", "1e999"), "f").findings] == ["TF007"]
+    assert [finding.code for finding in load(around.replace("NUMBER", "1e999"), "f").findings] == [
+        "TF007"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -117,7 +119,7 @@ def test_parameters_of_nodes_may_be_infinite(around: str) -> None:
     ],
 )
 def test_what_is_named_params_elsewhere_may_not_be_infinite(around: str) -> None:
-    assert [one.code for one in load(around, "f").findings] == ["TF007"]
+    assert [finding.code for finding in load(around, "f").findings] == ["TF007"]
 
 
 TEXT = """\
@@ -204,7 +206,7 @@ def test_merges_give_what_is_missing_and_the_first_wins() -> None:
     ],
 )
 def test_what_yaml_allows_and_a_robot_does_not_is_one_finding(text: str, code: str) -> None:
-    assert {one.code for one in load(text, "f").findings} == {code}
+    assert {finding.code for finding in load(text, "f").findings} == {code}
 
 
 @pytest.mark.parametrize(
@@ -313,7 +315,7 @@ def test_what_is_too_large_for_a_robot_is_refused_no_later_than_the_largest_file
         began = time.process_time()
         with pytest.raises(RejectedError) as rejected:
             load(text, "f")
-        assert [one.code for one in rejected.value.findings] == ["TF008"], case
+        assert [finding.code for finding in rejected.value.findings] == ["TF008"], case
         assert time.process_time() - began < longest, case
 
 
@@ -416,14 +418,17 @@ def test_a_null_that_removes_nothing_is_a_finding_at_its_place_also_in_a_list() 
     findings = validate(
         laid("tfcompose: 1\nrobot: r\nbase:\nvars: {c: ~}\ninclude: [a, null]\n")
     ).findings
-    assert [(one.code, one.span and one.span.line) for one in findings] == [
+    assert [(finding.code, finding.span and finding.span.line) for finding in findings] == [
         ("TF006", n) for n in (3, 4, 5)
     ]
 
 
 @pytest.mark.parametrize("profiles", ["5", "[a]", "{a: 5}", "{a: {profiles: {b: {}}}}"])
 def test_profiles_of_a_wrong_form_are_found_without_choosing_one(profiles: str) -> None:
-    assert {one.code for one in laid(f"profiles: {profiles}\n").findings} <= {"TF103", "TF101"}
+    assert {finding.code for finding in laid(f"profiles: {profiles}\n").findings} <= {
+        "TF103",
+        "TF101",
+    }
     assert laid(f"profiles: {profiles}\n").findings
 
 
@@ -461,7 +466,11 @@ two: {<<: *used, 3: {a: !mine b}}
 
 def test_faults_below_an_anchor_are_reported_once_and_only_if_it_is_used() -> None:
     findings = load(ASIDE, "f").findings
-    places = sorted((one.code, one.span.line, one.span.column) for one in findings if one.span)
+    places = sorted(
+        (finding.code, finding.span.line, finding.span.column)
+        for finding in findings
+        if finding.span
+    )
     assert places == [("TF004", 2, 28), ("TF004", 4, 18), ("TF005", 2, 19), ("TF007", 2, 38)]
 
 

@@ -207,7 +207,7 @@ def test_a_bag_that_was_split_is_read_in_order_without_its_metadata_too(
     folder = tmp_path / "split"
     folder.mkdir()
     for part in range(11):
-        sent = [one for one in drive(11.0) if part <= one[1] < part + 1]
+        sent = [transform for transform in drive(11.0) if part <= transform[1] < part + 1]
         [file] = [
             f
             for f in write_bag(tmp_path / f"part_{part}", sent, mcap=mcap).iterdir()

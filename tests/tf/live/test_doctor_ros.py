@@ -229,7 +229,7 @@ def test_what_is_wrong_is_found_with_the_nodes_and_the_numbers(
         for code, names in SCENES[scene].items():
             text = messages_of(found, code)
             assert [name for name in names if name not in text] == [], text
-        assert {one["code"] for one in found if not in_a_pause(one)} <= {
+        assert {entry["code"] for entry in found if not in_a_pause(entry)} <= {
             *SCENES[scene],
             *LATE,
         }, found
@@ -348,7 +348,7 @@ def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: 
             talker.kill()
     text = messages_of(found, "TF834")
     assert re.search(r" (3|2\.9\d) s ahead ", text), text
-    assert {one["code"] for one in found} == {"TF834"}
+    assert {entry["code"] for entry in found} == {"TF834"}
 
 
 def test_a_robot_as_planned_gives_no_finding_and_each_difference_is_one(

@@ -205,7 +205,7 @@ def test_one_who_floods_the_tree_leaves_room_for_others(monkeypatch: pytest.Monk
         take(observer, f"map own_{number}", S, gid=B) if number < 5 else None
     assert observer.beyond == {A: 30}
     assert (observer.floods(A), observer.floods(B)) == (True, False)
-    assert {one.child for one in observer.edges(S) if one.stream.gid == B} == {
+    assert {edge.child for edge in observer.edges(S) if edge.stream.gid == B} == {
         f"own_{number}" for number in range(5)
     }
 

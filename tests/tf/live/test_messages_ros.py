@@ -39,8 +39,8 @@ def test_every_message_is_read_as_a_plain_decoder_does(
         data = encode(transforms)
         message = reader.read(received(data), static=False)
         plain = decode(data)
-        assert message.edges == tuple((one.parent, one.child) for one in plain)
-        assert list(message.stamps_ns) == [one.stamp_ns for one in plain]
+        assert message.edges == tuple((transform.parent, transform.child) for transform in plain)
+        assert list(message.stamps_ns) == [transform.stamp_ns for transform in plain]
 
 
 @settings(max_examples=300, deadline=None)
@@ -67,16 +67,16 @@ def test_what_is_no_message_is_refused_as_a_plain_decoder_does_also_after_good_o
         read = None
     assert (read is None) == (plain is None)
     if read and plain:
-        assert list(read.stamps_ns) == [one.stamp_ns for one in plain]
+        assert list(read.stamps_ns) == [transform.stamp_ns for transform in plain]
 
 
 @pytest.mark.parametrize("name", [b"od\xffm\0", b"od\0m\0", b"\xed\xa0\x80m\0", b"odomX"])
 def test_names_of_any_bytes_are_those_that_rclpy_takes(name: bytes) -> None:
     data = encode([SentTransform(0, "map", "odom", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
-    (one,) = decode(data.replace(b"odom\0", name))
+    (transform,) = decode(data.replace(b"odom\0", name))
     stamped = serialize_message(TransformStamped(child_frame_id="odom"))
     assert (
-        one.child
+        transform.child
         == deserialize_message(stamped.replace(b"odom\0", name), TransformStamped).child_frame_id
     )
     assert MessageLayout(data).exact

@@ -34,7 +34,7 @@ def test_each_publisher_is_named_with_rate_and_delay_and_a_chain_has_a_net_delay
             for each in rows(monitor("--for", str(seconds), "--format", "json"))
         }
         assert set(found) == {"/drive", "/ekf", "/one", "/other"}
-        for name, rate in (("one", one()), ("other", other())):
+        for name, rate in (("one", sender()), ("other", other())):
             assert found[f"/{name}"]["child"] == "y"
             assert found[f"/{name}"]["rate"] == pytest.approx(rate, rel=0.15)
         assert 0 <= found["/one"]["least_delay_s"] < 0.25 <= found["/other"]["least_delay_s"]
@@ -55,7 +55,7 @@ def test_each_publisher_is_named_with_rate_and_delay_and_a_chain_has_a_net_delay
     with (
         sending("drive", "odom", "base_link", rate=50),
         sending("ekf", "map", "odom", rate=20, late_s=0.25),
-        sending("one", "x", "y", rate=50) as one,
+        sending("one", "x", "y", rate=50) as sender,
         sending("other", "x", "y", rate=20, late_s=0.25) as other,
     ):
         at_last(are_named)

@@ -152,6 +152,6 @@ def test_what_differs_from_the_plan_is_found_by_the_doctor_and_by_verify(
         for code, names in EXPECTED.items():
             text = messages_of(some, code)
             assert [name for name in names if name not in text] == [], text
-        assert {one["code"] for one in some} <= {*EXPECTED, *LATE}, some
-    at = {one["code"] for one in found[0] if one["line"]}
+        assert {name["code"] for name in some} <= {*EXPECTED, *LATE}, some
+    at = {name["code"] for name in found[0] if name["line"]}
     assert at >= EXPECTED.keys() - {"TF803"}, "verify says where the edge stands in the file"

@@ -150,7 +150,7 @@ def test_junit_has_a_case_for_each_edge(tmp_path: Path, robot: str) -> None:
             ["fell silent", "odom → base_link", "7.02 s"],
         ),
         (
-            [*RIGHT[:2], *(one for one in drive() if not 1.0 < one[1] < 2.0)],
+            [*RIGHT[:2], *(transform for transform in drive() if not 1.0 < transform[1] < 2.0)],
             "TF804",
             ["was silent", "odom → base_link", "1.02 s"],
         ),

@@ -47,7 +47,7 @@ def _nothing_known(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def names(node: Any) -> list[str]:
-    return [one.node for one in graph.writers(node, "/tf_static")]
+    return [writer.node for writer in graph.writers(node, "/tf_static")]
 
 
 @pytest.mark.parametrize("nameless", [UNKNOWN_NODE, BARE_DDS])

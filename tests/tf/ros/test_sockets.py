@@ -10,9 +10,9 @@ from tfcompose.tf.ros.sockets import LostDatagrams, buffer_limit, widen_buffers
 
 @pytest.fixture
 def receiver() -> Iterator[socket.socket]:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.bind(("127.0.0.1", 0))
-        yield one
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bound:
+        bound.bind(("127.0.0.1", 0))
+        yield bound
 
 
 def send(receiver: socket.socket, number: int) -> None:

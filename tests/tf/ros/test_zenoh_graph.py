@@ -46,7 +46,7 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 def tf(*edges: str) -> bytes:
-    pairs = (one.split() for one in edges)
+    pairs = (names.split() for names in edges)
     return encode(
         [
             SentTransform(time.time_ns(), parent, child, (0.0, 0.0, 0.0), IDENTITY)
@@ -179,8 +179,12 @@ def test_each_message_is_given_the_node_that_sent_it(peers: Peers) -> None:
             peers.rogue.gid("/tf"): {"/rogue"},
         }
         peers.rogue.leave("/tf")
-        assert until(lambda: [one.node for one in graph.publishers("/tf")] == ["/robot1/slam"])
-        assert [one.durability for one in graph.publishers("/tf_static")] == ["transient_local"]
+        assert until(
+            lambda: [publisher.node for publisher in graph.publishers("/tf")] == ["/robot1/slam"]
+        )
+        assert [publisher.durability for publisher in graph.publishers("/tf_static")] == [
+            "transient_local"
+        ]
 
 
 def test_a_message_without_an_attachment_is_of_nobody_who_is_known(peers: Peers) -> None:
@@ -191,7 +195,7 @@ def test_a_message_without_an_attachment_is_of_nobody_who_is_known(peers: Peers)
 
         def has_come() -> bool:
             peers.slam.send("/tf", tf("map odom"), attached=False)
-            return any(one.attachment is None for one in data.take())
+            return any(received.attachment is None for received in data.take())
 
         assert until(has_come)
 
@@ -219,15 +223,15 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
             peers.rogue.send("/tf", tf("map odom"))
             now = time.monotonic() - begun
             present = [
-                Publisher(one.gid, one.node, False, one.topic, one.type)  # noqa: FBT003 (moving edges)
-                for one in graph.publishers("/tf")
+                Publisher(publisher.gid, publisher.node, False, publisher.topic, publisher.type)  # noqa: FBT003 (moving edges)
+                for publisher in graph.publishers("/tf")
             ]
             events = judge.graph(present, now)
-            for one in data.take():
-                if not one.static and one.attachment:
-                    sent = one.attachment
+            for sample in data.take():
+                if not sample.static and sample.attachment:
+                    sent = sample.attachment
                     received = Received(
-                        one.data, sent.gid, sent.source_ns, one.received_ns, sent.sequence
+                        sample.data, sent.gid, sent.source_ns, sample.received_ns, sent.sequence
                     )
                     message = reader.read(received, static=False)
                     events += judge.judge_arrival(judge.take(message, now), message, now)
@@ -237,7 +241,9 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
             return bool(found)
 
         assert until(is_found)
-    assert [(one.found.code, "/rogue" in one.found.message) for one in found] == [("TF801", True)]
+    assert [(event.found.code, "/rogue" in event.found.message) for event in found] == [
+        ("TF801", True)
+    ]
 
 
 def test_without_a_router_one_sentence_says_so() -> None:
@@ -272,8 +278,8 @@ def test_monitor_names_publishers_on_zenoh_without_an_installed_rmw_zenoh(
         thread.join()
     assert result.returncode == 0, result.stderr
     found = {
-        (one["parent"], one["child"], one["publisher"])
-        for one in json.loads(result.stdout)["edges"]
+        (edge["parent"], edge["child"], edge["publisher"])
+        for edge in json.loads(result.stdout)["edges"]
     }
     assert found == {
         ("map", "odom", "/robot1/slam"),

@@ -176,13 +176,13 @@ def test_the_chain_names_the_children_of_its_edges() -> None:
     buffer = core(1, 3)
     buffer.set_transform_static(stamped("foo", "tool", 0), "unittest")
     buffer.set_transform_static(stamped("bar", "lamp", 0), "unittest")
-    one, two = Time(seconds=1), Time(seconds=2)
-    assert buffer._chain("bar", one, "tool", one, "bar") == ["tool", "foo"]
-    assert buffer._chain("tool", one, "bar", one, "tool") == ["foo", "tool"]
-    assert buffer._chain("lamp", two, "tool", one, "bar") == ["tool", "foo", "lamp"]
-    assert buffer._chain("tool", one, "tool", one, "tool") == []
+    first, two = Time(seconds=1), Time(seconds=2)
+    assert buffer._chain("bar", first, "tool", first, "bar") == ["tool", "foo"]
+    assert buffer._chain("tool", first, "bar", first, "tool") == ["foo", "tool"]
+    assert buffer._chain("lamp", two, "tool", first, "bar") == ["tool", "foo", "lamp"]
+    assert buffer._chain("tool", first, "tool", first, "tool") == []
     with pytest.raises(LookupException):
-        buffer._chain("bar", one, "baz", one, "bar")
+        buffer._chain("bar", first, "baz", first, "bar")
 
 
 # tf2_ros

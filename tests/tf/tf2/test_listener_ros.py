@@ -160,7 +160,7 @@ def test_a_program_that_sends_a_cameras_frames_serves_one_that_moves_its_clouds(
     )
 
 
-def one(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link") -> bytes:
+def encoded(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link") -> bytes:
     return encode([SentTransform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
 
 
@@ -176,7 +176,7 @@ def test_a_listener_without_a_node_hears_a_namespace_from_its_own_thread(other: 
     requested = {"qos": profile(depth=7, reliability=2), "static_qos": 5}  # best effort
     with TransformListener(buffer, namespace="robot1", **requested) as listener:
         publisher = TFPublisher(other, static=True, topic="/robot1/tf_static")
-        publisher.publish(one(0.5, 0))
+        publisher.publish(encoded(0.5, 0))
         found = buffer.lookup_transform("odom", "base_link", 0, timeout=60 * S)
         assert found.transform.translation.x == 0.5
         assert [writer.node for writer in writers(other, "/robot1/tf_static")] == ["/test/talks"]
@@ -200,9 +200,9 @@ def test_an_executor_spins_until_the_transform_is_there(node: Any, other: Any) -
     future = buffer.wait_for_transform_async("odom", "laser", Time(seconds=5))
     executor.spin_until_future_complete(future, timeout_sec=0.2)
     assert not future.done()
-    fixed.publish(one(0.5, 0, "base_link", "laser"))
+    fixed.publish(encoded(0.5, 0, "base_link", "laser"))
     for stamp in (4, 6):
-        moving.publish(one(float(stamp), stamp * S))
+        moving.publish(encoded(float(stamp), stamp * S))
     executor.spin_until_future_complete(future, timeout_sec=60)
     found = future.result()
     assert type(found).__module__.startswith("geometry_msgs")
@@ -235,8 +235,8 @@ def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(
         return bool(buffer.on_insert)
 
     assert until(requested)
-    publisher.publish(one(1.0, 4 * S))
-    publisher.publish(one(2.0, 6 * S))
+    publisher.publish(encoded(1.0, 4 * S))
+    publisher.publish(encoded(2.0, 6 * S))
 
     def answered() -> bool:
         executor.spin_once(timeout_sec=0.05)
@@ -264,13 +264,13 @@ def test_a_listener_of_its_own_follows_the_simulated_clock_and_says_when_it_goes
 
         assert until(lambda: publisher.publisher.get_subscription_count() == 1)
         assert until(lambda: at(100))
-        publisher.publish(one(1.0, 100 * S))
+        publisher.publish(encoded(1.0, 100 * S))
         assert until(lambda: buffer.can_transform("odom", "base_link", Time()))
         assert until(lambda: at(160))
         assert buffer.can_transform("odom", "base_link", Time()), "a jump forward forgets nothing"
         assert until(lambda: at(5))
         assert until(lambda: not buffer.can_transform("odom", "base_link", Time()))
-        publisher.publish(one(2.0, 5 * S))
+        publisher.publish(encoded(2.0, 5 * S))
         assert until(lambda: buffer.can_transform("odom", "base_link", Time(seconds=5)))
     assert "back by 155.000 s" in capfd.readouterr().err
 
@@ -284,7 +284,7 @@ def test_a_thread_of_the_listeners_spins_the_entire_node_and_ends_with_it(
     with TransformListener(buffer, node, spin_thread=True):
         publisher = TFPublisher(other, static=False)
         assert until(lambda: publisher.publisher.get_subscription_count() == 1)
-        publisher.publish(one(1.0, S))
+        publisher.publish(encoded(1.0, S))
         assert (
             buffer.lookup_transform("odom", "base_link", 0, timeout=60 * S).transform.translation.x
             == 1.0
@@ -301,7 +301,7 @@ def test_a_wait_of_half_a_second_ends_after_half_a_second_and_callbacks_of_tf_ar
     with TransformListener(buffer, node):
         publisher = TFPublisher(other, static=False)
         assert until(lambda: publisher.publisher.get_subscription_count() == 1)
-        timer = threading.Timer(0.1, lambda: publisher.publish(one(3.0, 9 * S)))
+        timer = threading.Timer(0.1, lambda: publisher.publish(encoded(3.0, 9 * S)))
         timer.start()
         assert buffer.can_transform("odom", "base_link", Time(seconds=9), timeout=60 * S)
         timer.join()

@@ -57,7 +57,7 @@ def node() -> StandInNode:
     return StandInNode()
 
 
-def one(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link") -> bytes:
+def encoded(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link") -> bytes:
     return encode([SentTransform(stamp_ns, parent, child, (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
 
 
@@ -84,7 +84,7 @@ def test_a_listener_to_fixed_edges_alone_has_one_subscription(node: StandInNode)
     buffer = Buffer()
     listener = TransformListener(buffer, node, static_only=True)
     assert node.callbacks.keys() == {"/tf_static"}
-    node.callbacks["/tf_static"](one(0.5, 0, "base_link", "laser"))
+    node.callbacks["/tf_static"](encoded(0.5, 0, "base_link", "laser"))
     found = listener.buffer.lookup_transform("base_link", "laser", 0)
     assert found.transform.translation.x == 0.5
 
@@ -92,8 +92,12 @@ def test_a_listener_to_fixed_edges_alone_has_one_subscription(node: StandInNode)
 def test_malformed_messages_and_refused_transforms_are_reported_once(node: StandInNode) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, node)
-    bad = [b"\0\1\0\0\xff\xff\xff\xff", one(0, S, "base_link", "base_link"), one(float("nan"), S)]
-    for data in (*bad, *bad, one(1.0, S)):
+    bad = [
+        b"\0\1\0\0\xff\xff\xff\xff",
+        encoded(0, S, "base_link", "base_link"),
+        encoded(float("nan"), S),
+    ]
+    for data in (*bad, *bad, encoded(1.0, S)):
         node.callbacks["/tf"](data)
     assert listener.buffer.lookup_transform("odom", "base_link", 0).transform.translation.x == 1.0
     logged = "\n".join(node.logged)
@@ -110,15 +114,15 @@ def test_when_the_clock_goes_back_moving_edges_are_forgotten_once(
     node.at(100)
     buffer = Buffer(node=node) if both else Buffer()
     listener = TransformListener(buffer, node)
-    node.callbacks["/tf"](one(1.0, 100 * S))
-    node.callbacks["/tf_static"](one(0.5, 0, "base_link", "laser"))
+    node.callbacks["/tf"](encoded(1.0, 100 * S))
+    node.callbacks["/tf_static"](encoded(0.5, 0, "base_link", "laser"))
     node.at(101)
     assert buffer.can_transform("odom", "laser", Time())
     node.at(5)
     assert not buffer.can_transform("odom", "laser", Time())
     assert buffer.can_transform("base_link", "laser", Time())
     assert [line.split(":")[0] for line in node.logged] == ["time went back by 96.000 s"]
-    node.callbacks["/tf"](one(1.0, 5 * S))
+    node.callbacks["/tf"](encoded(1.0, 5 * S))
     assert buffer.can_transform("odom", "base_link", Time()), "what comes now is not too old"
     listener.close()
 

@@ -80,7 +80,8 @@ def deploying(computers: Computers, text: str, *words: str) -> subprocess.Popen[
 
 def current(computers: Computers) -> dict[str, str]:
     links = {
-        name: one.base / f"rover.{name}" / "current" for name, one in computers.computers.items()
+        name: computer.base / f"rover.{name}" / "current"
+        for name, computer in computers.computers.items()
     }
     return {name: link.readlink().name for name, link in links.items() if link.is_symlink()}
 
@@ -107,8 +108,8 @@ def is_on_trial(computers: Computers, name: str) -> bool:
 def journals(computers: Computers) -> str:
     """Return what the units printed, for a test that fails."""
     return "".join(
-        one.run("sh", "-c", "tail -n 20 $XDG_RUNTIME_DIR/*.journal").stdout
-        for one in computers.computers.values()
+        computer.run("sh", "-c", "tail -n 20 $XDG_RUNTIME_DIR/*.journal").stdout
+        for computer in computers.computers.values()
     )
 
 
@@ -173,7 +174,7 @@ def children(computers: Computers, name: str) -> dict[str, int]:
         sys.executable, "-m", "tfcompose", "ps", "--format", "json"
     )
     (robot,) = json.loads(done.stdout)
-    return {one["name"]: one["pid"] for one in robot["processes"] if one["pid"]}
+    return {process["name"]: process["pid"] for process in robot["processes"] if process["pid"]}
 
 
 def test_only_what_is_different_starts_again(computers: Computers) -> None:
@@ -193,10 +194,10 @@ def test_only_what_is_different_starts_again(computers: Computers) -> None:
     } <= set(done.stdout.splitlines()), done
     after = {name: children(computers, name) for name in NAMES}
     assert [
-        (name, one)
+        (name, process)
         for name in NAMES
-        for one in before[name]
-        if before[name][one] != after[name][one]
+        for process in before[name]
+        if before[name][process] != after[name][process]
     ] == [("rear", "rear_drive")]
     moved = deploy(computers, other.replace("[0, 0, 0.3]", "[0, 0, 0.4]"))
     assert (moved.returncode, "arm: restarted: guard" in moved.stdout) == (0, True), moved
@@ -293,9 +294,9 @@ def own_domains(computers: Computers) -> Iterator[None]:
     """Give each computer a ROS domain of its own while the test runs."""
 
     def boot_in(domains: dict[str, dict[str, str]]) -> None:
-        for name, one in computers.computers.items():
-            one.variables = domains[name]
-            one.lose_power()
+        for name, computer in computers.computers.items():
+            computer.variables = domains[name]
+            computer.lose_power()
             computers.boot(name)
 
     boot_in({name: {"ROS_DOMAIN_ID": str(number)} for number, name in enumerate(NAMES, 11)})

@@ -70,7 +70,7 @@ def test_each_process_that_is_started_is_a_unit_and_the_target_wants_them_all() 
 
 def test_own_processes_say_when_they_are_ready_and_others_are_executed() -> None:
     made = units(compiled_plan(DRIVEN))
-    assert {name: one["Service"]["Type"] for name, one in made.items() if "Service" in one} == {
+    assert {name: unit["Service"]["Type"] for name, unit in made.items() if "Service" in unit} == {
         "rover-static.service": ["notify"],
         "rover-guard.service": ["notify"],
         "rover-drive.service": ["exec"],
@@ -125,7 +125,8 @@ def test_a_process_that_is_waited_for_until_it_is_done_is_oneshot() -> None:
     plan = compiled_plan(DRIVEN)
     late = replace(plan.process("slam"), after={"drive": "done"})
     plan = replace(
-        plan, processes=tuple(late if one.name == "slam" else one for one in plan.processes)
+        plan,
+        processes=tuple(late if process.name == "slam" else process for process in plan.processes),
     )
     assert units(plan)["rover-drive.service"]["Service"]["Type"] == ["oneshot"]
     assert units(plan)["rover-drive.service"]["Service"]["Restart"] == ["on-failure"]
@@ -324,7 +325,7 @@ def test_a_host_is_a_profile_and_nobody_waits_for_a_service_of_another() -> None
 def test_a_folder_that_a_container_does_not_have_is_reported() -> None:
     plan = compiled_plan(DRIVEN)
     there = {"drive": "${build_dir}/x", "slam": "${build_dir}/../.."}
-    processes = tuple(replace(one, cwd=there.get(one.name)) for one in plan.processes)
+    processes = tuple(replace(process, cwd=there.get(process.name)) for process in plan.processes)
     output = compose(replace(plan, processes=processes), Machine(".."))[1]
     (line,) = [line for line in output if "${build_dir}" in line]
     assert all(name in line for name in ("slam", "${build_dir}/../..", "/robot"))
@@ -516,12 +517,12 @@ def test_stock_nodes_send_where_ours_do(tmp_path: Path, monkeypatch: pytest.Monk
     remap = [*plan.process("static").remap.items()]
     assert ("/tf_static", "/r1/tf_static") in remap
     stock = [
-        one
-        for one in actions
-        if getattr(one, "package", "") in {"robot_state_publisher", "tf2_ros"}
+        action
+        for action in actions
+        if getattr(action, "package", "") in {"robot_state_publisher", "tf2_ros"}
     ]
     assert len(stock) > 1
-    assert all(one.remappings == remap and one.namespace == "r1" for one in stock)
+    assert all(node.remappings == remap and node.namespace == "r1" for node in stock)
 
 
 def test_without_a_joint_in_the_urdf_our_own_publisher_is_started(
@@ -529,7 +530,7 @@ def test_without_a_joint_in_the_urdf_our_own_publisher_is_started(
 ) -> None:
     text = "tfcompose: 1\nrobot: r\nframes: {map: {}, base_link: {parent: map, xyz: [1, 0, 0]}}\n"
     _, actions = launched(text, tmp_path, monkeypatch)
-    assert [one.name for one in actions if one.kind == "ExecuteProcess"] == ["static"]
+    assert [action.name for action in actions if action.kind == "ExecuteProcess"] == ["static"]
     assert sent(actions) == {}
 
 
@@ -587,7 +588,7 @@ def test_who_waits_for_a_time_is_started_so_much_later(
 
 def test_a_unit_is_started_for_others_when_its_time_has_passed() -> None:
     made = units(compiled_plan(TIMED))
-    settling = {name: one.get("Service", {}).get("ExecStartPost") for name, one in made.items()}
+    settling = {name: unit.get("Service", {}).get("ExecStartPost") for name, unit in made.items()}
     assert {name: words for name, words in settling.items() if words} == {
         "delayed-usb.service": ["/bin/sleep 30"],
         "delayed-filter.service": ["/bin/sleep 0.5"],

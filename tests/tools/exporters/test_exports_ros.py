@@ -103,37 +103,39 @@ class Supervisor:
 
     def start(self, name: str) -> None:
         """Start a service, and wait until it is ready as far as that is known."""
-        one = self.services[name]
+        service = self.services[name]
         out = self._stack.enter_context((self._output / f"{name}.log").open("ab"))
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
             path = tempfile.mktemp(prefix="notify")  # noqa: S306 (an address, not a file)
             manager.bind(path)
             manager.settimeout(60)
-            env = one.env | ({"NOTIFY_SOCKET": path} if one.notifies else {})
+            env = service.env | ({"NOTIFY_SOCKET": path} if service.notifies else {})
             self.running[name] = processes.start(
-                one.argv, env=env, cwd=one.folder, stdout=out, stderr=out
+                service.argv, env=env, cwd=service.folder, stdout=out, stderr=out
             )
             try:
-                if one.notifies:
+                if service.notifies:
                     assert manager.recv(100) == b"READY=1", name
             finally:
                 Path(path).unlink()
-        if one.healthy:
-            assert until(lambda: processes.run(one.healthy, env=one.env).returncode == 0), name
+        if service.healthy:
+            assert until(
+                lambda: processes.run(service.healthy, env=service.env).returncode == 0
+            ), name
 
     def log(self, name: str) -> str:
         return (self._output / f"{name}.log").read_text("utf-8")
 
     def end(self) -> dict[str, int]:
         """End all, and return those that did not end with 0, with their exit codes."""
-        for one in self.running.values():
-            one.send_signal(signal.SIGINT)
+        for process in self.running.values():
+            process.send_signal(signal.SIGINT)
         try:
-            codes = {name: one.wait(TIMEOUT_S) for name, one in self.running.items()}
+            codes = {name: process.wait(TIMEOUT_S) for name, process in self.running.items()}
             return {name: code for name, code in codes.items() if code}
         finally:
-            for one in self.running.values():
-                one.kill()
+            for process in self.running.values():
+                process.kill()
             self._stack.close()
 
 
@@ -179,19 +181,19 @@ def services(folder: Path) -> dict[str, Service]:
 
     return {
         name: Service(
-            here(one["command"]),
-            image | one["environment"],
-            (folder / one["volumes"][0]["source"]).resolve(),
-            list(one.get("depends_on", ())),
-            healthy=here(one["healthcheck"]["test"][1:]) if _is_waited_for(name, made) else [],
+            here(service["command"]),
+            image | service["environment"],
+            (folder / service["volumes"][0]["source"]).resolve(),
+            list(service.get("depends_on", ())),
+            healthy=here(service["healthcheck"]["test"][1:]) if _is_waited_for(name, made) else [],
         )
-        for name, one in made["services"].items()
+        for name, service in made["services"].items()
     }
 
 
 def _is_waited_for(name: str, made: dict[str, Any]) -> bool:
-    waits = (one.get("depends_on", {}).get(name, {}) for one in made["services"].values())
-    return any(one.get("condition") == "service_healthy" for one in waits)
+    waits = (service.get("depends_on", {}).get(name, {}) for service in made["services"].values())
+    return any(wait.get("condition") == "service_healthy" for wait in waits)
 
 
 @pytest.fixture
@@ -220,8 +222,8 @@ def exported(
         return running[0]
 
     yield export
-    for one in running:
-        one.end()
+    for robot in running:
+        robot.end()
 
 
 def verified(folder: Path, wrong: str = "") -> str:

@@ -54,14 +54,14 @@ def manifests(
 
 def workloads(made: dict[str, Any]) -> dict[str, Any]:
     return {
-        one["metadata"]["name"]: one
-        for one in made.values()
-        if one["kind"] in ("StatefulSet", "Job")
+        document["metadata"]["name"]: document
+        for document in made.values()
+        if document["kind"] in ("StatefulSet", "Job")
     }
 
 
 def pod_of(made: dict[str, Any], name: str) -> dict[str, Any]:
-    (found,) = [one for path, one in workloads(made).items() if path.startswith(name)]
+    (found,) = [workload for path, workload in workloads(made).items() if path.startswith(name)]
     pod: dict[str, Any] = found["spec"]["template"]
     return pod
 
@@ -82,31 +82,32 @@ def test_kubernetes_takes_the_objects_of_every_robot(version: str) -> None:
             made, _ = manifests(text, cluster)
             resources = made.pop("kustomization.yaml")["resources"]
             assert set(resources) == set(made)
-            for one in made.values():
-                kubernetes_validate.validate(one, version, strict=True)
+            for document in made.values():
+                kubernetes_validate.validate(document, version, strict=True)
             assert len(workloads(made)) == len(made) - (1 if cluster.folder else 2)
 
 
 def test_no_edge_has_two_publishers_during_an_update() -> None:
     """A StatefulSet of one pod promises at most one; nothing else does."""
     made, _ = manifests(DRIVEN)
-    for one in workloads(made).values():
-        assert (one["kind"], one["spec"]["replicas"]) == ("StatefulSet", 1)
+    for workload in workloads(made).values():
+        assert (workload["kind"], workload["spec"]["replicas"]) == ("StatefulSet", 1)
         assert (
-            one["spec"]["selector"]["matchLabels"] == one["spec"]["template"]["metadata"]["labels"]
+            workload["spec"]["selector"]["matchLabels"]
+            == workload["spec"]["template"]["metadata"]["labels"]
         )
 
 
 def test_what_is_waited_for_until_it_is_done_is_a_job_and_each_runs_on_its_host() -> None:
     made, gaps = manifests(HOSTED)
-    kinds = {name: one["kind"] for name, one in workloads(made).items()}
+    kinds = {name: workload["kind"] for name, workload in workloads(made).items()}
     (spawner,) = [name for name in kinds if name.startswith("big-rover-spawner-")]
     assert kinds[spawner] == "Job"
     assert workloads(made)[spawner]["spec"]["template"]["spec"]["restartPolicy"] == "OnFailure"
     fewer, _ = manifests(
         HOSTED.replace("spawner: {", "spawner: {restart: on-failure, max_restarts: 2, ")
     )
-    (job,) = [one for one in workloads(fewer).values() if one["kind"] == "Job"]
+    (job,) = [workload for workload in workloads(fewer).values() if workload["kind"] == "Job"]
     assert job["spec"]["backoffLimit"] == 2
     assert {kinds[f"big-rover-{name}"] for name in ("static", "drive", "late", "guard")} == {
         "StatefulSet"
@@ -210,8 +211,8 @@ def test_files_whose_paths_make_one_key_keep_their_texts() -> None:
     """``arm/drive`` is a process of a part, ``arm_drive`` one beside it."""
     plan = compiled_plan(DRIVEN)
     files = {"drive": "params/arm/drive.yaml", "slam": "params/arm_drive.yaml"}
-    changed = [replace(one, params_file=files.get(one.name)) for one in plan.processes]
-    texts = {path: path for one in changed for path in files_of(plan, one)}
+    changed = [replace(process, params_file=files.get(process.name)) for process in plan.processes]
+    texts = {path: path for process in changed for path in files_of(plan, process)}
     made = {
         file.path: yaml.safe_load(file.text)
         for file in kubernetes(replace(plan, processes=tuple(changed)), Cluster("i"), texts)[0]
@@ -226,8 +227,8 @@ def test_a_new_plan_restarts_what_it_changes() -> None:
     def digests(text: str) -> dict[str, str]:
         made, _ = manifests(text)
         return {
-            name: one["spec"]["template"]["metadata"]["annotations"]["tfcompose/content"]
-            for name, one in workloads(made).items()
+            name: workload["spec"]["template"]["metadata"]["annotations"]["tfcompose/content"]
+            for name, workload in workloads(made).items()
         }
 
     before, after = digests(DRIVEN), digests(DRIVEN.replace("wheel: 0.1", "wheel: 0.2"))
@@ -246,10 +247,11 @@ def test_a_word_that_kubernetes_would_fill_in_stays_as_it_is() -> None:
     named = replace(
         plan,
         processes=tuple(
-            replace(one, name="a$(b)") if one.name == "late" else one for one in plan.processes
+            replace(process, name="a$(b)") if process.name == "late" else process
+            for process in plan.processes
         ),
     )
-    texts = {path: "" for one in named.started for path in files_of(named, one)}
+    texts = {path: "" for process in named.started for path in files_of(named, process)}
     made = {
         file.path: yaml.safe_load(file.text) for file in kubernetes(named, Cluster("i"), texts)[0]
     }

@@ -71,7 +71,7 @@ def test_a_pose_between_two_robots_is_found(
     pose, stamp_ns = observer.buffer.latest("r1/base_link", "r2/base_link")
     assert pose.xyz == pytest.approx((1.0, 0.0, 0.0))
     assert stamp_ns is not None
-    assert [(one.robot, one.state) for one in observer.status()] == [
+    assert [(edge.robot, edge.state) for edge in observer.status()] == [
         ("r1", "live"),
         ("r2", "live"),
     ]
@@ -99,12 +99,12 @@ def test_a_broken_link_is_stale_within_3_s_and_live_again_when_it_is_mended(
     broken = time.monotonic()
 
     def states() -> dict[str, str]:
-        return {one.robot: one.state for one in observer.status()}
+        return {edge.robot: edge.state for edge in observer.status()}
 
     assert until(lambda: states()["r2"] != "live")
     assert time.monotonic() - broken < 3.0
     assert states()["r1"] == "live"
-    assert {one.code for one in observer.findings()} <= {"TF882", "TF883"}
+    assert {finding.code for finding in observer.findings()} <= {"TF882", "TF883"}
     two.link.mend()
     assert until(lambda: states()["r2"] == "live")
 
@@ -146,7 +146,7 @@ def test_no_pose_is_given_over_a_broken_link_and_new_ones_after(
     assert until(pose)
     assert until(lambda: pose() and given[-1][1] < 1.0)
     assert max(age_s for _, age_s in given) < 3.0, "and none of those that the link had held back"
-    assert {one.state for one in observer.status()} == {"live"}
+    assert {edge.state for edge in observer.status()} == {"live"}
 
 
 def test_what_a_link_held_back_is_as_old_as_it_is(
@@ -155,7 +155,7 @@ def test_what_a_link_held_back_is_as_old_as_it_is(
     router = f"tcp/127.0.0.1:{free_port()}"
     with session("router", listen=[router]), session("client", connect=[router]) as robot:
         observer = observe({"r1": router})
-        assert until(lambda: [one.state for one in observer.status()] == ["silent"])
+        assert until(lambda: [edge.state for edge in observer.status()] == ["silent"])
         before = datetime.fromtimestamp(time.time() - 30, timezone.utc)
         sent = zenoh.Timestamp.parse_rfc3339(f"{before:%Y-%m-%dT%H:%M:%SZ}/{robot.zid()}")
 
@@ -172,7 +172,7 @@ def test_what_a_link_held_back_is_as_old_as_it_is(
         assert (status.state, status.edges[1].stale) == ("stale", True)
         with pytest.raises(StaleError, match="r1"):
             observer.pose("r1/odom", "r1/base_link")
-        assert [one.code for one in observer.findings()] == ["TF883"]
+        assert [finding.code for finding in observer.findings()] == ["TF883"]
 
 
 def test_a_router_that_is_not_there_is_named_and_found_when_it_comes(
@@ -180,13 +180,13 @@ def test_a_router_that_is_not_there_is_named_and_found_when_it_comes(
 ) -> None:
     router = f"tcp/127.0.0.1:{free_port()}"
     observer = observe({"r1": router})
-    assert [one.code for one in observer.findings()] == ["TF882"]
+    assert [finding.code for finding in observer.findings()] == ["TF882"]
     with pytest.raises(StaleError, match="r1 is unreachable"):
         observer.pose("map", "r1/base_link")
     with pytest.raises(TransformException):
         observer.pose("map", "r1/nothing")
     with session("router", listen=[router]):
-        assert until(lambda: [one.code for one in observer.findings()] == ["TF883"])
+        assert until(lambda: [finding.code for finding in observer.findings()] == ["TF883"])
         robot = SimulatedRobot(fleet_of({"r1": router}), "r1", 0.0)
         try:
             assert until(lambda: list(observer.findings()) == [])
@@ -215,9 +215,9 @@ def test_only_shared_edges_leave_with_their_names_in_the_fleet_once_in_each_peri
     assert edges.take(tf(("base_link", "laser")), static=False, now_ns=0) is None
     assert decode(edges.fixed_message()) == []
     assert edges.take(tf(("map", "odom"), ("map", "dock")), static=True, now_ns=0) is None
-    assert [(one.parent, one.child) for one in decode(edges.fixed_message())] == [
-        ("map", "r1/odom")
-    ]
+    assert [
+        (transform.parent, transform.child) for transform in decode(edges.fixed_message())
+    ] == [("map", "r1/odom")]
 
 
 def test_the_command_lists_robots_prints_poses_and_says_what_is_wrong(
@@ -231,7 +231,10 @@ def test_the_command_lists_robots_prints_poses_and_says_what_is_wrong(
         return done.returncode, done.stdout + done.stderr
 
     code, output = fleet("ps", "--format", "json", "--for", "2")
-    assert (code, [one["state"] for one in json.loads(output)["robots"]]) == (0, ["live", "live"])
+    assert (code, [robot["state"] for robot in json.loads(output)["robots"]]) == (
+        0,
+        ["live", "live"],
+    )
     code, output = fleet("echo", "r1/base_link", "r2/base_link", "--once", "--format", "json")
     assert code == 0, output
     assert json.loads(output)["xyz"] == pytest.approx([1.0, 0.0, 0.0])
@@ -258,25 +261,27 @@ def test_of_twenty_robots_all_are_listed_and_the_one_that_dies_is_stale(tmp_path
             def poses(pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
                 """Return the pairs between which there is no pose."""
                 missing = []
-                for one, other in pairs:
+                for pair, other in pairs:
                     try:
-                        observer.pose(f"{one}/base_link", f"{other}/base_link")
+                        observer.pose(f"{pair}/base_link", f"{other}/base_link")
                     except (StaleError, TransformException):
-                        missing.append((one, other))
+                        missing.append((pair, other))
                 return missing
 
-            pairs = [(one, other) for one in names for other in names]
+            pairs = [(name, other) for name in names for other in names]
             assert until(lambda: not poses(pairs))
             command = [sys.executable, "-m", "tfcompose", "fleet", "ps", "--format", "json"]
 
             def listed() -> dict[str, str]:
                 done = processes.run([*command, "--for", "5"], cwd=tmp_path)
-                return {one["robot"]: one["state"] for one in json.loads(done.stdout)["robots"]}
+                return {
+                    robot["robot"]: robot["state"] for robot in json.loads(done.stdout)["robots"]
+                }
 
             assert listed() == dict.fromkeys(names, "live")
             robots.kill("r7")
-            assert until(lambda: [one.code for one in observer.findings()] == ["TF883"])
-            assert [one.robot for one in observer.status() if one.state != "live"] == ["r7"]
+            assert until(lambda: [finding.code for finding in observer.findings()] == ["TF883"])
+            assert [edge.robot for edge in observer.status() if edge.state != "live"] == ["r7"]
             assert until(lambda: not poses([pair for pair in pairs if "r7" not in pair]))
             assert poses(pairs) == [
                 pair for pair in pairs if "r7" in pair and pair != ("r7", "r7")

@@ -27,17 +27,17 @@ def found(text: str) -> list[tuple[str, int]]:
         findings = list(check_fleet(validate_fleet(source), source))
     except RejectedError as error:
         findings = list(error.findings)
-    return sorted((one.code, one.span.line if one.span else 0) for one in findings)
+    return sorted((finding.code, finding.span.line if finding.span else 0) for finding in findings)
 
 
 def test_a_sound_fleet_has_edges_with_rates_and_names_of_its_own() -> None:
     assert found(SOUND) == []
     fleet = validate_fleet(load(SOUND, "fleet.yaml"))
-    assert [(one.ends, one.rate) for one in fleet.edges_of("r1")] == [
+    assert [(edge.ends, edge.rate) for edge in fleet.edges_of("r1")] == [
         (("map", "odom"), 5.0),
         (("odom", "base_link"), 5.0),
     ]
-    assert [one.ends for one in fleet.edges_of("r2")] == [("map", "base_link")]
+    assert [edge.ends for edge in fleet.edges_of("r2")] == [("map", "base_link")]
     assert [fleet.final("r2", name) for name in ("map", "odom", "r2/odom")] == [
         "map",
         "r2/odom",
@@ -52,7 +52,7 @@ def test_the_rate_may_stand_behind_the_edge(text: str) -> None:
     fleet = validate_fleet(
         load(SOUND.replace("{edge: odom -> base_link, rate: 5 Hz}", text), "fleet.yaml")
     )
-    assert [(one.ends, one.rate) for one in fleet.edges_of("r1")][1] == (
+    assert [(edge.ends, edge.rate) for edge in fleet.edges_of("r1")][1] == (
         ("odom", "base_link"),
         2.0,
     )
@@ -83,7 +83,9 @@ def test_what_is_wrong_is_found_at_its_place(
 def test_a_file_that_begins_as_a_robots_does_is_answered_with_how_a_fleets_begins() -> None:
     with pytest.raises(RejectedError) as raised:
         validate_fleet(load(SOUND.replace("fleet: 1", "tfcompose: 1"), "fleet.yaml"))
-    assert any(one.code == "TF101" and "fleet: 1" in one.help for one in raised.value.findings)
+    assert any(
+        finding.code == "TF101" and "fleet: 1" in finding.help for finding in raised.value.findings
+    )
 
 
 def test_the_command_lints_and_needs_a_robot_that_is_there(tmp_path: Path) -> None:

@@ -35,9 +35,9 @@ def test_edges_that_are_shared_leave_the_robot_and_no_others(
         observer = FleetObserver(fleet_of(routers))
         stack.callback(observer.close)
         assert until(lambda: {"r1/odom", "r1/base_link"} <= observer.buffer.frames)
-        assert {one.state for one in observer.status()} == {"live"}
+        assert {edge.state for edge in observer.status()} == {"live"}
         assert observer.buffer.frames == {"r1/odom", "r1/base_link"}
-        assert [one.code for one in observer.findings()] == ["TF884"], (
+        assert [finding.code for finding in observer.findings()] == ["TF884"], (
             "the file here shares map → odom, too"
         )
         sharing.send_signal(signal.SIGINT)

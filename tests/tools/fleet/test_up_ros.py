@@ -47,7 +47,7 @@ def test_a_robot_of_a_fleet_shares_its_edges_when_it_comes_up(
     def listed() -> dict[str, int | None]:
         done = processes.run([*command, "ps", "--format", "json"], cwd=tmp_path, env=env)
         (robot,) = json.loads(done.stdout)
-        return {one["name"]: one["pid"] for one in robot["processes"]}
+        return {process["name"]: process["pid"] for process in robot["processes"]}
 
     with ExitStack() as stack:
         running = processes.start([*command, "up", "--no-live"], cwd=tmp_path, env=env)

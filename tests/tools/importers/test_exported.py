@@ -114,16 +114,16 @@ def test_the_import_of_an_export_is_the_same_robot(file: Path, tmp_path: Path) -
     launch_file = exported(file, tmp_path / "out")
     text, _ = import_of(launch_file, code=None)
     before, after = (
-        compiled(one, folder).robot
-        for one, folder in ((file.read_text("utf-8"), file.parent), (text, launch_file.parent))
+        compiled(source, folder).robot
+        for source, folder in ((file.read_text("utf-8"), file.parent), (text, launch_file.parent))
     )
     assert before
     assert after
     same_tree(before, after)
     wanted, found = started_with(before), started_with(after)
     assert wanted.keys() <= found.keys()
-    for name, one in wanted.items():
-        assert found[name] == one, name
+    for name, value in wanted.items():
+        assert found[name] == value, name
 
 
 @pytest.fixture(scope="module")

@@ -59,8 +59,8 @@ def individual_params(folder: Path, **kits: dict[str, str]) -> Path:
 
     By vehicle, the kits with their calibrations below the kit's base.
     """
-    for vehicle, several in kits.items():
-        for kit, text in several.items():
+    for vehicle, texts in kits.items():
+        for kit, text in texts.items():
             inner = folder / "individual_params/config" / vehicle / kit
             inner.mkdir(parents=True)
             (inner / "sensors_calibration.yaml").write_text(SENSORS, encoding="utf-8")
@@ -269,7 +269,7 @@ def test_clearpaths_entries_have_what_its_generator_gives_them_unless_they_say_o
     main(["import", str(source), "-o", str(tmp_path / "out.yaml")])
     parts = yaml.safe_load((tmp_path / "out.yaml").read_text(encoding="utf-8"))["parts"]
     params = {name: part["params"] for name, part in parts.items() if name != "platform"}
-    assert {name: one["parent_link"] for name, one in params.items()} == {
+    assert {name: value["parent_link"] for name, value in params.items()} == {
         "plate": "default_mount",
         "front": "front_bumper_mount",
         "arch": "default_mount",
@@ -278,7 +278,7 @@ def test_clearpaths_entries_have_what_its_generator_gives_them_unless_they_say_o
         "post_0": "default_mount",
         "camera_0": "default_mount",
     }
-    models = {name: one["model"] for name, one in params.items() if "model" in one}
+    models = {name: value["model"] for name, value in params.items() if "model" in value}
     assert models == {
         "plate": "default",
         "front": "default",

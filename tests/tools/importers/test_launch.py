@@ -176,7 +176,9 @@ def test_what_is_not_taken_is_named_with_its_line(
     wanted = ['"cameras", default', 'executable="rviz2"']
     found = places(printed_errors(capsys), "TF020")
     for words in wanted:
-        line = next(number for number, one in enumerate(lines, start=1) if words in one)
+        line = next(
+            number for number, text_line in enumerate(lines, start=1) if words in text_line
+        )
         assert f"rover.launch.py:{line}" in found
         assert f"rover.launch.py:{line}: " in text
     assert "cameras:=2" in text
@@ -188,7 +190,7 @@ def test_what_an_included_file_lacks_is_named_and_all_else_of_it_is_there(
 ) -> None:
     (tmp_path / "inner.launch.py").write_text(INNER, encoding="utf-8")
     _, data = import_of(source(tmp_path, "a.launch.py", OUTER))
-    assert {name: one.get("params") for name, one in data["processes"].items()} == {
+    assert {name: process.get("params") for name, process in data["processes"].items()} == {
         "first": {"other": 1},
         "second": {"speed": "${args.unit}"},
     }
@@ -508,7 +510,9 @@ def test_the_clock_of_parameter_files_is_the_robots_if_all_agree(
     assert data["rules"] == {"TF335": "warning"}, "a clock of the source is no error"
     built = compiled(text, tmp_path)
     assert built.robot
-    clocks = {one.name: one.params.get("use_sim_time") for one in built.robot.processes}
+    clocks = {
+        process.name: process.params.get("use_sim_time") for process in built.robot.processes
+    }
     assert (clocks["a"], clocks["b"], clocks["c"]) == ("true", False, None)
 
 
@@ -1079,7 +1083,7 @@ def test_a_node_that_the_source_does_not_name_keeps_its_name_and_has_the_paramet
     assert robot
     files = {file.path: file.text for file in emit(robot)}
     plan = read_plan(files["plan.json"], "plan.json")
-    (started,) = (one for one in plan.started if one.params_file)
+    (started,) = (process for process in plan.started if process.params_file)
     assert not [word for word in started.argv if word.startswith("__node:=")]
     assert started.params_file
     assert yaml.safe_load(files[started.params_file])["/**"]["ros__parameters"] == {"rate": 100}
@@ -1125,7 +1129,7 @@ def test_shells_prefixes_and_what_comes_later_are_as_launch_has_them(
         "after": {"first": "started"},
     }
     assert processes["shell"]["run"]["args"] == ["--a", "b", "--c"]
-    assert [name for name, one in processes.items() if "prefix" in one] == ["prefixed"]
+    assert [name for name, process in processes.items() if "prefix" in process] == ["prefixed"]
     assert processes["prefixed"]["prefix"] == ["nice", "-n", "5"]
     assert processes["last"]["params"] == {"text": 1}
     assert processes["tool"]["run"] == {"package": "q", "executable": "tool", "args": ["--fast"]}
@@ -1175,7 +1179,7 @@ def test_nodes_have_the_namespaces_that_launch_gives_them(
     assert data["ros"]["namespace"] == "leader"
     robot = compiled(imported, tmp_path).robot
     assert robot
-    nodes = {one.node for one in robot.processes if one.package}
+    nodes = {process.node for process in robot.processes if process.package}
     assert nodes == {"/leader/same", "/leader/deep/below", *(["/outside"] if outside else [])}
 
 
@@ -1708,7 +1712,7 @@ COMPOSED_XML = """<launch>
 def test_components_find_their_container_though_earlier_ones_are_gone(tmp_path: Path) -> None:
     """Python gives the ``id`` of an object that is gone to another one."""
     _, data = import_of(source(tmp_path, "a.launch.py", GONE), code=None)
-    containers = {name: one["container"] for name, one in data["processes"].items()}
+    containers = {name: process["container"] for name, process in data["processes"].items()}
     assert containers == {f"in_{count}": f"box_{count}" for count in range(50)}
 
 

@@ -69,7 +69,7 @@ def test_which_model_a_calibrated_camera_is_stays_a_question_where_several_fit()
 
 def test_a_second_publisher_is_named() -> None:
     draft = drafted(sound_tree().moving("map base_link", b"x"))
-    assert [one.code for one in draft.findings] == ["TF020"]
+    assert [finding.code for finding in draft.findings] == ["TF020"]
 
 
 def test_a_publisher_that_is_no_ros_node_is_external_with_what_it_is(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_a_publisher_that_is_no_ros_node_is_external_with_what_it_is(tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("measured", "meant"),
+    ("measured", "expected"),
     [
         (49.7, 50),
         (10.02, 10),
@@ -96,9 +96,9 @@ def test_a_publisher_that_is_no_ros_node_is_external_with_what_it_is(tmp_path: P
     ],
 )
 def test_rates_are_round_where_a_round_one_is_near(
-    measured: float | None, meant: float | None
+    measured: float | None, expected: float | None
 ) -> None:
-    assert round_rate(measured) == meant
+    assert round_rate(measured) == expected
 
 
 def test_a_comment_names_a_node_whose_name_is_another_one_at_each_start() -> None:

@@ -50,8 +50,10 @@ def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
     Words, names, remappings, parameters.
     """
     records = recorded(file, *words)
-    return {one["node"]: _loaded(one) for one in records if "component" in one} | dict(
-        one_of(one["words"], one["params"]) for one in records if "component" not in one
+    return {record["node"]: _loaded(record) for record in records if "component" in record} | dict(
+        one_of(record["words"], record["params"])
+        for record in records
+        if "component" not in record
     )
 
 
@@ -74,9 +76,9 @@ def recorded(file: Path, *words: str) -> list[dict[str, Any]]:
     return records
 
 
-def _loaded(one: dict[str, Any]) -> dict[str, Any]:
-    params = {key: repr(value) for key, value in sorted(one["params"].items())}
-    return {"program": one["component"], **one, "params": params, "component": True}
+def _loaded(record: dict[str, Any]) -> dict[str, Any]:
+    params = {key: repr(value) for key, value in sorted(record["params"].items())}
+    return {"program": record["component"], **record, "params": params, "component": True}
 
 
 def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str, Any]]:
@@ -88,7 +90,7 @@ def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str
     name, namespace = remap.pop("__node", ""), remap.pop("__ns", "/")
     given = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-p"]
     params: dict[str, Any] = {
-        name: yaml.safe_load(value) for name, value in (one.split(":=", 1) for one in given)
+        name: yaml.safe_load(value) for name, value in (arg.split(":=", 1) for arg in given)
     }
     for file in files:
         for node in file.values():
@@ -114,11 +116,11 @@ def of_robot(robot: Robot) -> dict[str, dict[str, Any]]:
         if process.package
     }
     return {
-        one.get("node") or nodes.get(name, one["program"]): {
-            key: value for key, value in one.items() if key not in {"env", "output"}
+        process.get("node") or nodes.get(name, process["program"]): {
+            key: value for key, value in process.items() if key not in {"env", "output"}
         }
-        | ({"component": True} if "node" in one else {})
-        for name, one in started_with(robot).items()
+        | ({"component": True} if "node" in process else {})
+        for name, process in started_with(robot).items()
     }
 
 
@@ -166,15 +168,15 @@ def test_each_process_is_started_as_launch_would(
     file.write_text(text, encoding="utf-8")
     expected, found = started(file, *words), imported(file, *words)
     expected = {
-        key: one
-        for key, one in expected.items()
-        if not one["program"].endswith("/static_transform_publisher")
+        key: value
+        for key, value in expected.items()
+        if not value["program"].endswith("/static_transform_publisher")
     }
     assert expected
     found.pop("sleep", None)  # the time of a timer, which launch starts no process for
     assert found.keys() == expected.keys()
-    for key, one in expected.items():
-        assert found[key] == one, key
+    for key, value in expected.items():
+        assert found[key] == value, key
 
 
 def test_actions_and_substitutions_of_other_packages_do_what_they_do(tmp_path: Path) -> None:
@@ -360,8 +362,8 @@ def test_a_real_node_has_the_parameters_that_it_has_with_launch(
         return processes.run(command, env=dict(domain.environment), check=True).stdout
 
     params = [
-        file_of(f"{number}.yaml", one) if isinstance(one, str) else one
-        for number, one in enumerate(given)
+        file_of(f"{number}.yaml", arg) if isinstance(arg, str) else arg
+        for number, arg in enumerate(given)
     ]
     text = ORDER.replace("NAMED", named).replace("GIVEN", repr(params))
     file = Path(file_of("a.launch.py", text))
@@ -372,8 +374,8 @@ def test_a_real_node_has_the_parameters_that_it_has_with_launch(
             words[at + 1] = file_of(f"launched_{at}.yaml", next(texts))
     robot = compiled(import_of(file)[0], tmp_path).robot
     assert robot
-    built = {one.path: one.text for one in emit(robot)}
-    several = read_plan(built["plan.json"], "p").processes
-    (process,) = (one for one in several if "p/e" in one.argv[0])
+    built = {emitted.path: emitted.text for emitted in emit(robot)}
+    planned = read_plan(built["plan.json"], "p").processes
+    (process,) = (process for process in planned if "p/e" in process.argv[0])
     path = file_of("built.yaml", built.get(f"params/{process.name}.yaml", ""))
-    assert read([one.replace("${params_file}", path) for one in process.argv]) == read(words)
+    assert read([arg.replace("${params_file}", path) for arg in process.argv]) == read(words)

@@ -227,10 +227,11 @@ def test_colours_get_names_that_the_language_has(tmp_path: Path) -> None:
     output = '<material name="{}"><color rgba="{} 0 0 1"/></material>'
     visual = "<visual><geometry><sphere radius='1'/></geometry>{}</visual>"
     visuals = "".join(
-        visual.format(output.format(*one)) for one in (("light blue", 1), ("light-blue", 0.5))
+        visual.format(output.format(*colour))
+        for colour in (("light blue", 1), ("light-blue", 0.5))
     )
     text = imported(f'<robot name="r"><link name="base_link">{visuals}</link></robot>', tmp_path)
-    names = [one["material"]["name"] for one in data(text)["links"]["base_link"]["visual"]]
+    names = [visual["material"]["name"] for visual in data(text)["links"]["base_link"]["visual"]]
     assert names == ["light_blue", "light_blue_"]
     assert re.search(r"# .*light_blue .*'light blue'", text)
 
@@ -337,7 +338,7 @@ def test_a_mesh_can_say_which_model_a_sensor_is(tmp_path: Path) -> None:
         assert body in urdf
         text = imported(urdf, tmp_path)
         sensors = data(text).get("sensors", {})
-        assert [one["preset"] for one in sensors.values()] == ([preset] if preset else [])
+        assert [sensor["preset"] for sensor in sensors.values()] == ([preset] if preset else [])
         assert bool(preset) or "sensors: {roof: {preset: …" in " ".join(
             text.replace("#", "").split()
         )
@@ -366,7 +367,7 @@ def test_a_sensor_is_recognised_under_other_names_if_its_model_is_named(tmp_path
     named = with_mesh(urdf, "lidar3d_0_link", "VLP16_base_1.dae")
     (sensor,) = data(imported(named, tmp_path))["sensors"].values()
     assert sensor["preset"] == "velodyne/vlp16"
-    names = {name: one["name"] for name, one in sensor["frames"].items()}
+    names = {name: frame["name"] for name, frame in sensor["frames"].items()}
     assert names == {"lidar3d_0_base_link": "lidar3d_0_link", "lidar3d_0": "lidar3d_0_laser"}
     assert '<child link="lidar3d_0_laser"/>' in built(tmp_path / "robot.yaml")
     assert "sensors" not in data(imported(urdf, tmp_path))

@@ -75,7 +75,7 @@ REFUSED: dict[str, dict[str, tuple[set[str], str]]] = {
 def codes_of(file: Path) -> set[str]:
     """Return the codes for which the robot is refused; none for one that is taken."""
     name = file.with_suffix("").as_posix()
-    refused = (one for robots in REFUSED.values() for one in robots.items())
+    refused = (robot for robots in REFUSED.values() for robot in robots.items())
     return next((codes for end, (codes, _) in refused if name.endswith(f"/{end}")), set())
 
 
@@ -136,11 +136,13 @@ def test_a_sensor_is_recognised_or_left_as_frames_and_the_tree_is_the_same(
     }
     sensor |= {"driver": "none"} if preset.driver else {}
     frames = {
-        key: one
-        for key, one in preset.frames.items()
-        if holds(one.when, _usual(preset), "tfcompose")
+        key: frame
+        for key, frame in preset.frames.items()
+        if holds(frame.when, _usual(preset), "tfcompose")
     }
-    own = {key.replace("{name}", "front"): UNIT for key, one in frames.items() if one.xyz is None}
+    own = {
+        key.replace("{name}", "front"): UNIT for key, frame in frames.items() if frame.xyz is None
+    }
     sensor |= {"frames": own} if own else {}
     spec = {"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {"front": sensor}}
     spec["rules"] = {"TF401": "off"}

@@ -166,7 +166,7 @@ def test_what_stands_around_a_command_in_a_terminal_is_no_part_of_it(
     assert [(edge.name, edge.pose.xyz) for edge in result.robot.edges] == [
         ("base_link → a", (0, 0, 1))
     ]
-    assert not [one.name for one in result.robot.processes if one.argv]
+    assert not [process.name for process in result.robot.processes if process.argv]
 
 
 def test_a_publisher_behind_an_unknown_program_is_named_and_prefixes_stay(

@@ -13,9 +13,9 @@ from tfcompose.tools.view.server import start_server, stop_server
 
 @pytest.fixture
 def server() -> Iterator[viser.ViserServer]:
-    one = start_server("127.0.0.1", 0, "test", TOKEN)
-    yield one
-    stop_server(one)
+    started = start_server("127.0.0.1", 0, "test", TOKEN)
+    yield started
+    stop_server(started)
 
 
 @pytest.fixture

@@ -82,7 +82,7 @@ def test_latched_frames_hold_at_any_time_also_before_they_were_recorded(tmp_path
 
 def test_a_latched_frame_that_is_replaced_has_the_value_of_the_time(tmp_path: Path) -> None:
     late: Sent = ("/tf_static", 6.0, "base_link", "mast", 6.0, (0.0, 0.0, 0.9), UP)
-    tree = tree_of(write_bag(tmp_path / "bag", sorted([*sent(), late], key=lambda one: one[1])))
+    tree = tree_of(write_bag(tmp_path / "bag", sorted([*sent(), late], key=lambda row: row[1])))
     for at_s, height_m in ((5.9, 0.5), (6.0, 0.9), (2.0, 0.5), (9.0, 0.9)):
         tree.at_s = at_s
         picture = tree.next_picture()

@@ -108,7 +108,7 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
     assert after.quat_xyzw == pytest.approx(before.quat_xyzw)
     assert off.xyz == pytest.approx((0, 0, 0.1), abs=0.01)
     old, new = ROVER.read_text("utf-8").splitlines(), rover.read_text("utf-8").splitlines()
-    (changed,) = [(one, other) for one, other in zip(old, new, strict=True) if one != other]
+    (changed,) = [(line, other) for line, other in zip(old, new, strict=True) if line != other]
     assert changed[0].partition("#")[2] == changed[1].partition("#")[2] != ""
     assert changed[1].split("#")[0].strip() == f"xyz: [{after.xyz[0]:g}, 0.0475, {after.xyz[2]:g}]"
     assert tfcompose_in(rover.parent, "lint", rover.name).returncode == 0
@@ -120,8 +120,8 @@ def pixel(client: viser.ClientHandle, pose: Pose, left: float) -> tuple[float, f
     The scene begins at ``left``.
     """
     camera = client.camera
-    w, x, y, z = (float(one) for one in camera.wxyz)
-    px, py, pz = (float(one) for one in camera.position)
+    w, x, y, z = (float(number) for number in camera.wxyz)
+    px, py, pz = (float(number) for number in camera.position)
     right, down, forward = (Pose((px, py, pz), (x, y, z, w)).inverse() @ pose).xyz
     focal = camera.image_height / 2 / math.tan(camera.fov / 2)
     return (

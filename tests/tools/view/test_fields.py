@@ -78,7 +78,7 @@ def test_what_is_blocked_is_what_the_rule_says(server: viser.ViserServer) -> Non
     text += "rules: {TF641: {limit: 1 %}}\n"
     done = compile_robot(text, "r.yaml", PRESETS)
     assert done.robot
-    (rule,) = (one for one in done.findings if one.code == "TF641")
+    (rule,) = (finding for finding in done.findings if finding.code == "TF641")
     number = re.search(r"(\d+) %.*\((\w+)\)", rule.message)
     assert number
     fields = FieldsOfView(server.scene, done.robot)

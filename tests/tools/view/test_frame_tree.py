@@ -22,8 +22,8 @@ ARM = {
 def tree_of(parents: dict[str, str]) -> FrameTree:
     """Return the tree of frames by their parents; a root has none."""
     frames = "".join(
-        f"  {one}: {{{f'parent: {parent}, xyz: [1, 0, 0]' if parent else ''}}}\n"
-        for one, parent in parents.items()
+        f"  {child}: {{{f'parent: {parent}, xyz: [1, 0, 0]' if parent else ''}}}\n"
+        for child, parent in parents.items()
     )
     robot = compile_robot(f"tfcompose: 1\nrobot: r\nframes:\n{frames}", "r.yaml", PRESETS).robot
     assert robot

@@ -123,7 +123,7 @@ def test_what_is_off_by_more_than_the_tolerance_has_a_ghost_with_all_below_it() 
     live = Live()
     live.run(mast=Pose((0, 0, 0.6)))
     judgement = live.tree.judge(FOUND_S)
-    assert [one.code for one in judgement.findings] == ["TF846"]
+    assert [finding.code for finding in judgement.findings] == ["TF846"]
     assert judgement.off["mast"].xyz_m == pytest.approx(0.1)
     picture = live.tree.next_picture()
     assert picture
@@ -160,7 +160,7 @@ def test_a_stolen_edge_is_red_until_the_thief_has_left() -> None:
     live.run()
     live.send(ROGUE, 4.0, ("odom", "base_link", Pose((9, 0, 0))))
     judgement = live.tree.judge(4.0)
-    assert [one.code for one in judgement.findings] == ["TF801"]
+    assert [finding.code for finding in judgement.findings] == ["TF801"]
     assert "/rogue" in judgement.findings[0].message
     picture = live.tree.next_picture()
     assert picture
@@ -196,7 +196,7 @@ def test_a_silent_edge_is_red() -> None:
     live.observe(8.0, {STATIC, JOINTS, DRIVE})
     judgement = live.tree.judge(8.0)
     assert judgement.wrong == {"base_link"}
-    assert {one.code for one in judgement.findings} == {"TF804"}
+    assert {finding.code for finding in judgement.findings} == {"TF804"}
 
 
 @pytest.mark.parametrize("silence_s", [2.0, 25.0])
@@ -229,7 +229,7 @@ def test_frames_that_nobody_declared_are_shown_where_they_are() -> None:
     live = Live()
     live.run()
     live.send(ROGUE, 4.0, ("lidar", "<b>spy</b>", Pose((1, 0, 0))))
-    assert [one.code for one in live.tree.judge(4.0).findings] == ["TF803"]
+    assert [finding.code for finding in live.tree.judge(4.0).findings] == ["TF803"]
     picture = live.tree.next_picture()
     assert picture
     assert picture.further["<b>spy</b>"].xyz == pytest.approx((2.1, 0, 0.8))

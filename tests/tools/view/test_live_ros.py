@@ -66,7 +66,7 @@ def following(
     session: Session, *, joints: bool = False, in_browser: bool = False
 ) -> Iterator[View]:
     """Show the robot that runs in the test's domain, in a window of its own or a browser's."""
-    files, changed = WatchedFiles(lambda one: Path(one).read_text("utf-8")), threading.Event()
+    files, changed = WatchedFiles(lambda path: Path(path).read_text("utf-8")), threading.Event()
     for file in session.texts:
         files(file)
     server, ending = start_server("127.0.0.1", 0, "test", TOKEN), Stop()
@@ -101,7 +101,7 @@ def test_two_windows_choose_for_themselves(view: View) -> None:
         first, other = (shown.panel for shown in view.windows.panels)
         first.tree.select("lidar")
         assert (first.selected, other.selected) == ("lidar", "odom")
-        in_first, in_other = (view.following.shown[one] for one in view.windows.panels)
+        in_first, in_other = (view.following.shown[panel] for panel in view.windows.panels)
         in_first.panel.fixed.value = "lidar"
         assert until(lambda: in_first.tree.fixed == "lidar")
         assert in_other.tree.fixed != "lidar"
@@ -171,7 +171,7 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(view: View, nodes:
             assert until(lambda: view.is_red)
             took_s = time.monotonic() - begun
             assert sent()
-            assert [one.code for one in view.judgement.findings] == ["TF801"]
+            assert [finding.code for finding in view.judgement.findings] == ["TF801"]
             assert f"/rogue{number}" in view.judgement.findings[0].message
         return took_s < 1
 
@@ -206,7 +206,7 @@ def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_mo
             "/joint_states",
             lambda _: JointState(name=["w"], position=[-0.5]),
         )
-        assert until(lambda: [one.state for one in view.following.senders] == ["stopped"])
+        assert until(lambda: [sender.state for sender in view.following.senders] == ["stopped"])
         assert until(lambda: view.following.senders[0].others_found == ("/jsp",))
 
 
@@ -222,7 +222,7 @@ def test_a_file_that_changes_is_followed_from_then_on(
     moved = EXTERNAL.replace("xyz: [0, 0, 0.3]", "xyz: [0, 0, 0.4]")
     (tmp_path / "rover.yaml").write_text(moved, "utf-8")
     view.changed.set()
-    assert until(lambda: [one.code for one in view.judgement.findings] == ["TF846"])
+    assert until(lambda: [finding.code for finding in view.judgement.findings] == ["TF846"])
     assert until(lambda: view.server.scene.get_handle_by_name("/ghost/2") is not None)
     (tmp_path / "rover.yaml").write_text(EXTERNAL + "  odom2: [\n", "utf-8")
     view.changed.set()

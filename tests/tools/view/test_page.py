@@ -72,7 +72,7 @@ def test_the_page_moves_joints_finds_selects_measures_and_has_named_views(tmp_pa
         assert rows(page) == ["base", "upper", "tool", "hand"]
         page.get_by_text("hand in tool, static, by static").wait_for()
         page.locator("#base").select_option("base")
-        away = f"{math.dist(*(poses[one].xyz for one in ('base', 'hand'))) * 1000:.4g} mm away"
+        away = f"{math.dist(*(poses[name].xyz for name in ('base', 'hand'))) * 1000:.4g} mm away"
         assert f"{away}: {numbers(relative)}" in page.locator("#about").inner_text()
         page.locator("#search").fill("")
         assert rows(page) == everything

@@ -23,9 +23,9 @@ ROBOTS = sorted((Path(__file__).parents[3] / "robots").glob("*.yaml"))
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """The folder for pictures, which the environment may name: TFCOMPOSE_TEST_PICTURES."""
-    one = Path(os.environ.get("TFCOMPOSE_TEST_PICTURES") or tmp_path)
-    one.mkdir(parents=True, exist_ok=True)
-    return one
+    path = Path(os.environ.get("TFCOMPOSE_TEST_PICTURES") or tmp_path)
+    path.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 @pytest.mark.parametrize("file", ROBOTS, ids=[file.stem for file in ROBOTS])

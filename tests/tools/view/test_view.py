@@ -127,9 +127,9 @@ def test_undo_and_redo_lead_over_a_save(rover: Path) -> None:
     assert close(session.mount(other).edge.pose, Pose((3, 0, 0)))
 
 
-def close(one: Pose, other: Pose) -> bool:
+def close(pose: Pose, other: Pose) -> bool:
     """Return whether two poses are the same to a micrometre and a microradian."""
-    return max(offset_of(one, other)) < 1e-6
+    return max(offset_of(pose, other)) < 1e-6
 
 
 def test_what_a_variable_gives_is_not_saved_and_an_overlay_is_offered(rover: Path) -> None:
@@ -138,7 +138,7 @@ def test_what_a_variable_gives_is_not_saved_and_an_overlay_is_offered(rover: Pat
     child = (
         mount.edge.child
         if mount
-        else next(one.mount for one in session.robot.sensors if one.name == "lidar")
+        else next(sensor.mount for sensor in session.robot.sensors if sensor.name == "lidar")
     )
     session.move(child, Pose((0.1, 0, 1.5)))
     saved = session.save()
@@ -409,15 +409,15 @@ def test_a_built_plan_is_shown_with_its_bodies_and_frames(rover: Path) -> None:
     plan = read_plan((rover.parent / "out" / "plan.json").read_text("utf-8"), "plan.json")
     urdf = (rover.parent / "out" / plan.description).read_text("utf-8")
     robot = robot_of_plan(plan, urdf, "robot.urdf", Packages().asset)
-    meant = session_of(rover).robot
-    assert robot.frames.keys() == meant.frames.keys()
+    expected = session_of(rover).robot
+    assert robot.frames.keys() == expected.frames.keys()
     bodies = {frame for frame, link in robot.links.items() if link.visuals or link.collisions}
     assert bodies == {
-        frame for frame, link in meant.links.items() if link.visuals or link.collisions
+        frame for frame, link in expected.links.items() if link.visuals or link.collisions
     }
-    there, here = poses_in_roots(robot, {}), poses_in_roots(meant, {})
+    there, here = poses_in_roots(robot, {}), poses_in_roots(expected, {})
     assert all(max(offset_of(here[frame], pose)) < 1e-9 for frame, pose in there.items())
-    limits = {edge.joint.name: edge.joint.limit for edge in meant.edges if edge.joint}
+    limits = {edge.joint.name: edge.joint.limit for edge in expected.edges if edge.joint}
     assert {edge.joint.name: edge.joint.limit for edge in robot.edges if edge.joint} == limits
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from tests.support.cli import tfcompose_in
 
-_EDIT = re.compile(r"  (remove|write)   ?(\S+?):(\d+)(?::\d+)?: (.*)")
+_EDIT = re.compile(r"  (remove|write)   ?(\S+?):(\d+)(?::\d+)?(?:, to line (\d+))?: (.*)")
+_UNKNOWN = "  remove  in the launch file: "
 
 #: Three stock publishers of fixed edges; they are at lines 2 to 4.
 PUBLISHERS = """<launch>
@@ -23,18 +24,23 @@ def status_of(folder: Path, robot: str, *launch: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def hand_over_first(folder: Path, robot: str, launch: str) -> str:
-    """Apply the edits of the first edge; return the line that names it."""
-    lines = status_of(folder, robot, launch)
+def hand_over_first(folder: Path, robot: str, *launch: str) -> str:
+    """Apply the edits of the first step; return the line that names its edges.
+
+    Without a launch file, ending its publisher is up to the caller.
+    """
+    lines = status_of(folder, robot, *launch)
     end = next((at for at, line in enumerate(lines[1:], 1) if line[0] != " "), len(lines))
-    texts = {name: (folder / name).read_text("utf-8").split("\n") for name in (robot, launch)}
+    texts = {name: (folder / name).read_text("utf-8").split("\n") for name in (robot, *launch)}
     for line in lines[1:end]:
+        if line.startswith(_UNKNOWN) and not launch:
+            continue
         found = _EDIT.fullmatch(line)
         assert found, line
-        do, file, number, text = found.groups()
-        lines_of_file = texts[Path(file).name]
-        indented = f"  {text}"
-        lines_of_file[int(number) - 1] = indented if do == "write" else ""
+        do, file, first, last, text = found.groups()
+        count = int(last or first) - int(first)
+        lines_of_file = [f"  {text}" if do == "write" else "", *[""] * count]
+        texts[Path(file).name][int(first) - 1 : int(first) + count] = lines_of_file
     for name, kept in texts.items():
         (folder / name).write_text("\n".join(kept), encoding="utf-8")
     return lines[0]

@@ -22,6 +22,9 @@ NEEDS_STOCK_ROS = {
     "test_the_containers_of_rclcpp_components_load_a_component": (
         "stock containers come with a distribution only; a stand-in loads components"
     ),
+    "tests/tools/importers/test_adopt_ros.py": (
+        "static_transform_publisher comes with a distribution only"
+    ),
     "tests/tools/importers/test_real_launch.py": _LAUNCH,
     "tests/tools/importers/test_launch.py": _LAUNCH,
     "tests/tools/importers/test_confined_launch.py": _LAUNCH,

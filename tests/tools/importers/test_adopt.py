@@ -5,11 +5,13 @@ from pathlib import Path
 import pytest
 
 from tests.support.adoption import PUBLISHERS, hand_over_first, status_of
+from tests.support.bags import UP, write_bag
 from tests.support.cli import tfcompose_in
 from tests.support.importing import PRESETS
 from tests.support.plans import compiled_plan
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.foundation.geometry import Pose
+from tfcompose.model.plan.hosts import with_guard_alone
 
 LAUNCH = "bringup.launch.xml"
 
@@ -43,8 +45,8 @@ def test_every_process_is_external_and_owns_the_edges_that_it_publishes(folder: 
         "imu": "/imu_tf",
         "gnss": "/gnss_tf",
     }
-    started = [process.name for process in plan.processes if process.kind != "external"]
-    assert started == ["static", "guard"]  # static without an edge, which a guard alone leaves out
+    started = [process.name for process in with_guard_alone(plan).processes]
+    assert started == ["lidar_tf", "imu_tf", "gnss_tf", "guard"]
 
 
 def test_the_tree_is_the_same_after_each_edge_that_is_handed_over(folder: Path) -> None:
@@ -75,3 +77,103 @@ def test_a_publisher_without_a_name_is_named_as_what_to_hand_over_first(tmp_path
     assert done.returncode == 0
     assert f"{LAUNCH}:2" in done.stderr
     assert "TF020" in done.stderr
+
+
+NODE_OF_SEVERAL = """tfcompose: 1
+robot: rover
+frames:
+  base_link: {}
+  mast:
+    parent: base_link
+    xyz: [0, 0, 1]
+    owner: tree
+    static: true
+  lidar: {parent: mast, xyz: [0.1, 0, 0], owner: tree, static: true}
+  imu: {parent: base_link, xyz: [0, 0.1, 0], owner: imu_tf, static: true}
+processes:
+  tree: {external: true, node: /my/tree}
+  imu_tf: {external: true}
+"""
+MOVING = "  wheel: {parent: base_link, owner: tree, rate: 20 Hz}\n"
+
+
+def test_edges_of_one_node_are_handed_over_together(tmp_path: Path) -> None:
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(NODE_OF_SEVERAL, "utf-8")
+    before = poses(NODE_OF_SEVERAL)
+    first = hand_over_first(tmp_path, robot.name)
+    assert first == "base_link → mast, mast → lidar: published by /my/tree"
+    text = robot.read_text("utf-8")
+    assert poses(text, "static").keys() == {("base_link", "mast"), ("mast", "lidar")}
+    assert poses(text) == before
+    assert "/my/tree" not in text
+    hand_over_first(tmp_path, robot.name)
+    assert poses(robot.read_text("utf-8"), "static") == before
+
+
+@pytest.mark.parametrize("launched", [True, False], ids=["launch file", "robot file alone"])
+def test_a_node_of_moving_edges_keeps_its_fixed_ones(launched: bool, tmp_path: Path) -> None:  # noqa: FBT001 (a parameter)
+    text = NODE_OF_SEVERAL.replace("processes:", f"{MOVING}processes:")
+    (tmp_path / "robot.yaml").write_text(text, "utf-8")
+    (tmp_path / LAUNCH).write_text(PUBLISHERS, "utf-8")
+    lines = status_of(tmp_path, "robot.yaml", *[LAUNCH] * launched)
+    heads = [line for line in lines if not line.startswith(" ")]
+    mast, lidar = "base_link → mast", "mast → lidar"
+    if launched:  # it starts a publisher of lidar
+        assert f"{lidar}: published by /my/tree" in heads
+        assert f"  remove  {LAUNCH}:2: the start of /my/tree" in lines
+    kept = mast if launched else f"{mast}, {lidar}"
+    assert heads[-1] == f"{kept}: stays with /my/tree, which also publishes base_link → wheel"
+    assert not any("tree, which owns" in line for line in lines)
+
+
+def test_a_driver_keeps_what_is_inside_of_its_sensor(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        """tfcompose: 1
+robot: rover
+frames:
+  base_link: {}
+  lamp: {parent: base_link, owner: camera, static: true}
+sensors:
+  cam: {preset: realsense/d435i, parent: base_link, tf: driver, driver: camera, owner: cam_tf, static: true}
+processes:
+  camera: {external: true, node: /cam/cam}
+  cam_tf: {external: true, node: /cam/tf}
+""",  # noqa: E501 (a text as its reader has it)
+        "utf-8",
+    )
+    lines = status_of(tmp_path, "robot.yaml")
+    handed_over, kept = (line for line in lines if not line.startswith(" "))
+    assert handed_over == "base_link → cam_bottom_screw_frame: published by /cam/tf"
+    assert kept.startswith("base_link → lamp: stays with /cam/cam, which also publishes cam_link")
+    hand_over_first(tmp_path, "robot.yaml")
+    plan = compiled_plan((tmp_path / "robot.yaml").read_text("utf-8"))
+    assert {edge.owner for edge in plan.edges} == {"static", "camera"}
+
+
+def test_edges_of_a_recording_stay_with_their_unknown_nodes(tmp_path: Path) -> None:
+    still = (("base_link", "lidar"), ("base_link", "imu"))
+    sent = [("/tf_static", 0.0, *edge, 0.0, (0.1, 0.0, 0.3), UP) for edge in still]
+    moved = [("/tf", i / 20, "odom", "base_link", i / 20, (i, 0.0, 0.0), UP) for i in range(40)]
+    write_bag(tmp_path / "run_17", [*sent, *moved])
+    done = tfcompose_in(tmp_path, "adopt", "--bag", "run_17", "-o", "robot.yaml")
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "robot.yaml").read_text("utf-8")
+    plan = compiled_plan(text)
+    assert {(edge.child, edge.kind, edge.owner) for edge in plan.edges} == {
+        ("base_link", "dynamic", "recorded"),
+        ("lidar", "static", "recorded"),
+        ("imu", "static", "recorded"),
+    }
+    alone = with_guard_alone(plan).processes
+    assert {process.name: process.kind for process in alone} == {
+        "recorded": "external",
+        "guard": "guard",
+    }
+    assert tfcompose_in(tmp_path, "verify", "robot.yaml", "--bag", "run_17").returncode == 0
+    (line,) = status_of(tmp_path, "robot.yaml")
+    assert "stays with /recorded" in line
+    (tmp_path / LAUNCH).write_text(PUBLISHERS, "utf-8")
+    hand_over_first(tmp_path, "robot.yaml", LAUNCH)
+    handed = poses((tmp_path / "robot.yaml").read_text("utf-8"), "static")
+    assert handed.keys() == {("base_link", "imu")} or handed.keys() == {("base_link", "lidar")}

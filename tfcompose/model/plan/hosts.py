@@ -109,12 +109,15 @@ def _share(plan: Plan, host: str | None) -> Plan:
 def with_guard_alone(plan: Plan) -> Plan:
     """Return the plan of a robot that others start: each process but the guard is external.
 
-    A guard cannot hold back what others start, so that a strict one watches.
+    The static publisher is left out if it has no edge. A guard cannot hold back what others start,
+    so that a strict one watches.
     """
-    processes = list(plan.processes)
-    for index, process in enumerate(processes):
-        if process.kind not in {"external", "guard"}:
-            processes[index] = _elsewhere(process)
+    processes = []
+    for process in plan.processes:
+        if process.kind in {"external", "guard"}:
+            processes.append(process)
+        elif process.kind != "static" or plan.edges_of(process.name):
+            processes.append(_elsewhere(process))
     mode = "watch" if plan.guard.mode == "strict" else plan.guard.mode
     return replace(plan, processes=tuple(processes), guard=replace(plan.guard, mode=mode))
 

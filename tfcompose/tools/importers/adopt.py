@@ -16,7 +16,7 @@ from tfcompose.tools.importers import command
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.foundation.findings import Span
     from tfcompose.model.robot import Edge, Robot
@@ -110,34 +110,89 @@ def _print_status(arguments: Namespace) -> int:
 
 
 def _status(robot: Robot, source: Source, publishers: Mapping[str, Span | None]) -> Iterator[str]:
-    external = {process.name for process in robot.processes if process.kind == "external"}
-    edges = [edge for edge in robot.edges if edge.kind == "static" and edge.owner in external]
-    counts = {owner: sum(e.owner == owner for e in robot.edges) for owner in external}
-    nodes = {process.name: process.node for process in robot.processes}
-    parts: set[str] = set()
+    """Yield the edits of each step, then the edges that have to stay with their nodes."""
+    stays = []
+    for process in robot.processes:
+        if process.kind != "external":
+            continue
+        edges = [edge for edge in robot.edges if edge.owner == process.name]
+        steps, others = _steps(edges, source, publishers)
+        kept = steps.pop(_TOGETHER, []) if others else []
+        if kept:
+            stays.append(
+                f"{_names(kept)}: stays with {process.node}, which also publishes {_names(others)}"
+            )
+        for (_, name), step in steps.items():
+            yield from _edits(step, source, publishers.get(name), process.node)
+            if len(step) == len(edges):
+                yield from _removal(process.name, source)
+    yield from stays
+
+
+#: The step of the edges that can only be handed over with all others of their node.
+_TOGETHER = ("", "")
+
+
+def _steps(
+    edges: Sequence[Edge], source: Source, publishers: Mapping[str, Span | None]
+) -> tuple[dict[tuple[str, str], list[Edge]], list[Edge]]:
+    """Return the edges of a process by the step that hands them over, and its other edges.
+
+    A part is a step, and so is a fixed edge that has a publisher of its own in the launch file.
+    """
+    steps: dict[tuple[str, str], list[Edge]] = {}
+    others = []
     for edge in edges:
         section, name = map(str, edge.entry[:2])
-        if section == "parts" and name in parts:
-            continue
-        parts |= {name} if section == "parts" else set()
-        started = publishers.get(name if section == "parts" else edge.child)
-        yield from _edits(edge, source, started, nodes[edge.owner])
-        if counts[edge.owner] == 1 or section == "parts":
-            at = source.key_span(("processes", edge.owner))
-            yield f"  remove  {at}: {edge.owner}, which owns no other edge"
-            if len(source.mapping("processes")) == 1:
-                emptied = source.key_span(("processes",))
-                yield f"  remove  {emptied}: processes, which is empty then"
+        if source.mapping(section, name).get("owner") != edge.owner:
+            others.append(edge)  # of a driver, inside of its sensor
+        elif section == "parts":
+            steps.setdefault((section, name), []).append(edge)
+        elif edge.kind == "static":
+            step = (section, edge.child) if edge.child in publishers else _TOGETHER
+            steps.setdefault(step, []).append(edge)
+        else:
+            others.append(edge)
+    return steps, others
 
 
-def _edits(edge: Edge, source: Source, started: Span | None, node: str) -> Iterator[str]:
+def _names(edges: Sequence[Edge]) -> str:
+    return ", ".join(f"{edge.parent} → {edge.child}" for edge in edges)
+
+
+def _edits(
+    edges: Sequence[Edge], source: Source, started: Span | None, node: str
+) -> Iterator[str]:
+    """Yield what the edges are, and the edits of the launch file and of their entries."""
     from tfcompose.foundation.yaml_text import flow
 
-    section, name = edge.entry[:2]
-    keys: dict[str, Any] = dict(source.mapping(section, name))
-    kept = {key: value for key, value in keys.items() if key not in {"owner", "static"}}
-    what = f"the part {name}" if section == "parts" else f"{edge.parent} → {edge.child}"
+    entries = list(dict.fromkeys(edge.entry[:2] for edge in edges))
+    section, name = entries[0]
+    what = f"the part {name}" if section == "parts" else _names(edges)
     yield f"{what}: published by {node}"
-    where = f"{started.file}:{started.line}" if started else "in the launch file"
-    yield f"  remove  {where}: the start of {node}"
-    yield f"  write   {source.key_span((section, name))}: {name}: {flow(kept)}"
+    if started:
+        yield f"  remove  {started.file}:{started.line}: the start of {node}"
+    else:
+        yield f"  remove  in the launch file: the start of {node}, or its TF if it does more"
+    for section, name in entries:
+        keys: dict[str, Any] = dict(source.mapping(section, name))
+        kept = {key: value for key, value in keys.items() if key not in {"owner", "static"}}
+        at, end = source.key_span((section, name)), _last_line(source, (section, name), keys)
+        lines = f", to line {end}" if end > at.line else ""
+        yield f"  write   {at}{lines}: {name}: {flow(kept)}"
+
+
+def _last_line(source: Source, path: tuple[str | int, ...], value: Any) -> int:
+    """Return the line in which a value ends: the span of a block mapping ends at the next key."""
+    items = value.items() if isinstance(value, dict) else ()
+    lines = [_last_line(source, (*path, key), item) for key, item in items]
+    return max(lines, default=source.span_of(path).end_line)
+
+
+def _removal(process: str, source: Source) -> Iterator[str]:
+    """Yield the removal of a process without edges."""
+    at = source.key_span(("processes", process))
+    yield f"  remove  {at}: {process}, which owns no other edge"
+    if len(source.mapping("processes")) == 1:
+        emptied = source.key_span(("processes",))
+        yield f"  remove  {emptied}: processes, which is empty then"

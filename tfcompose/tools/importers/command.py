@@ -266,15 +266,15 @@ def observed_draft(arguments: Namespace, *, is_adopted: bool = False) -> ImportD
     )[topics]
     if arguments.bag:
         name = Path(arguments.bag).stem
-        head = f"imported from the recording {name} by tfcompose"
+        origin = f"the recording {name}"
     else:
-        name, head = "robot", "imported from a running robot by tfcompose"
-    draft = ImportDraft(arguments.robot or robot_name(name), [head])
+        name, origin = "robot", "a running robot"
+    done = "adopted" if is_adopted else "imported"
+    head = f"{done} from {origin} by tfcompose"
+    draft = ImportDraft(arguments.robot or robot_name(name), [head], is_adopted=is_adopted)
     if arguments.namespace:
         draft.sections["ros"] |= {"namespace": arguments.namespace, "isolate": "topics"}
-    tree = Observed(
-        draft, observer.publishers.where, words_of, arguments.namespace, is_adopted=is_adopted
-    )
+    tree = Observed(draft, observer.publishers.where, words_of, arguments.namespace)
     tree.add(observer.edges(observer.until_ns))
     if not arguments.no_sensors:
         tree.recognise(library())

@@ -48,8 +48,6 @@ class Observed:
     words_of: Callable[[int], Sequence[str]]
     #: The robot's namespace, without slashes.
     namespace: str = ""
-    #: Whether the robot keeps its nodes. Stock nodes then keep their fixed edges.
-    is_adopted: bool = False
     _owners: dict[str, str] = field(default_factory=dict)
     _poses: dict[str, Pose] = field(default_factory=dict)
 
@@ -76,7 +74,7 @@ class Observed:
             keys |= pose_keys(stream.pose, quaternion=True)
             keys |= {"owner": owner, "static": True} if owner else {}
         else:
-            keys |= {"owner": owner or self._unknown()}
+            keys |= {"owner": owner}
             rate = round_rate(edge.timing.rate)
             keys |= {"rate": f"{number(rate)} Hz"} if rate else {}
         frames[edge.child] = keys
@@ -84,7 +82,7 @@ class Observed:
     def _is_own(self, edge: EdgeState) -> bool:
         """Return whether tfcompose's static publisher or a stock node sends the edge."""
         below = f"/{self.namespace}/" if self.namespace else "/"
-        if self.is_adopted:
+        if self.draft.is_adopted:
             return edge.nodes == (below + STATIC,)
         return len(edge.nodes) == 1 and edge.nodes[0] in {below + STATIC, below + STATE_PUBLISHER}
 
@@ -177,14 +175,18 @@ class Observed:
         return new
 
     def _owner(self, edge: EdgeState) -> str | None:
-        """Return the process of an edge's publisher, or None where its node is not known."""
+        """Return the process of an edge's publisher.
+
+        None for a fixed edge of an unknown node, which tfcompose can publish; an adopted robot
+        keeps that node.
+        """
         if len(edge.nodes) != 1:
             for node in edge.nodes:
                 self.draft.note(
                     ("frames", edge.child), f"one of {', '.join(edge.nodes)} publishes it"
                 )
                 return self._process(node, edge)
-            return None
+            return None if edge.stream.static and not self.draft.is_adopted else self._unknown()
         return self._process(edge.nodes[0], edge)
 
     def _process(self, node: str, edge: EdgeState) -> str:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 #: Building or testing one package on a busy machine.
 COLCON_TIMEOUT_S = 240
 _WITHOUT_BYTECODE = "PYTHONDONTWRITEBYTECODE"
-_FILES = ("package.xml", "setup.py", "pyproject.toml", "README.md", "LICENSE")
-_FOLDERS = ("tfcompose", "robots", "schemas")
+_FILES = ("package.xml", "colcon.pkg", "setup.py", "pyproject.toml", "README.md", "LICENSE")
+_FOLDERS = ("tfcompose", "robots", "schemas", "tests")
 _IGNORED = shutil.ignore_patterns("__pycache__")
 
 

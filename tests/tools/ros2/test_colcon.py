@@ -62,6 +62,21 @@ def test_ros_knows_the_package(workspace: Workspace) -> None:
     }
 
 
+def test_colcon_tests_the_installed_robots_alone(workspace: Workspace) -> None:
+    robots = workspace.folder / "install" / "tfcompose" / "share" / "tfcompose" / "robots"
+    robot = robots / "wrong.yaml"
+    robot.write_text("tfcompose: 1\nrobot: wrong\nframes: {a: {parent: b}}\n", "utf-8")
+    count = len(list(robots.glob("*.yaml"))) + 1
+    try:
+        assert workspace.colcon("test").returncode == 0
+        result = workspace.colcon("test-result", "--verbose")
+    finally:
+        robot.unlink()
+    assert result.returncode == 1
+    assert f"Summary: {count} tests, 0 errors, 1 failure, 0 skipped" in result.stdout
+    assert f"{robot}:3:22: error[TF203]" in result.stdout
+
+
 def test_the_source_folder_stays_as_it_was(workspace: Workspace, tmp_path: Path) -> None:
     built = {file.name for file in (workspace.source / "tfcompose").iterdir()}
     again = Workspace(tmp_path).add_repository()

@@ -14,7 +14,7 @@ ros: {namespace: inner, isolate: ISOLATE}
 frames: {base_link: {}, lidar: {parent: base_link, xyz: [0, 0, 1]}}
 processes:
   node: {run: {package: demo, executable: talker}, remap: {chatter: own}, ready: {topic: chatter}}
-  alone: {run: {package: demo, executable: talker}, namespace: /alone}
+  alone: {run: {package: demo, executable: talker}, namespace: /alone, log_level: fatal}
   plain: {run: [sleep, "9"]}
 """
 
@@ -58,9 +58,31 @@ def test_the_clock_is_that_of_all_nodes(tmp_path: Path) -> None:
     assert "use_sim_time:=true" in found["node"]["argv"]
 
 
+def test_a_log_level_is_that_of_the_nodes_without_one(tmp_path: Path) -> None:
+    found, _ = processes_of(tmp_path, "none", "--log-level", "DEBUG")
+    levels = {name: process.get("log_level") for name, process in found.items()}
+    assert levels == {
+        "static": None,
+        "node": "debug",
+        "alone": "fatal",
+        "plain": None,
+        "guard": None,
+    }
+    assert found["node"]["argv"][-2:] == ["--log-level", "debug"]
+    assert found["alone"]["argv"].count("--log-level") == 1
+
+
 @pytest.mark.parametrize(
     "arguments",
-    [("-r", "__node:=x"), ("-p", "rate:=3"), ("--params-file", "a.yaml"), ("-r",), ("-r", "a")],
+    [
+        ("--log-level", "loud"),
+        ("--log-level", "node:=debug"),
+        ("-r", "__node:=x"),
+        ("-p", "rate:=3"),
+        ("--params-file", "a.yaml"),
+        ("-r",),
+        ("-r", "a"),
+    ],
     ids=" ".join,
 )
 def test_what_is_for_one_node_is_refused(tmp_path: Path, arguments: tuple[str, ...]) -> None:

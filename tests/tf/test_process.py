@@ -64,6 +64,23 @@ def test_a_node_has_the_name_and_the_namespace_of_the_plan(write: Callable[..., 
     assert own.description.parent == own.file.parent
 
 
+@pytest.mark.parametrize(
+    ("ros_args", "clock"),
+    [
+        ((), "wall"),
+        (("-p", "use_sim_time:=True"), "sim"),
+        (("--param", "use_sim_time:=true", "-p", "use_sim_time:=false"), "wall"),
+        (("-r", "use_sim_time:=true"), "wall"),
+        (("-p", "use_sim_time:=3"), "wall"),
+    ],
+)
+def test_its_clock_is_that_of_its_arguments(
+    write: Callable[..., Path], ros_args: tuple[str, ...], clock: str
+) -> None:
+    file = str(write([], PlanProcess("static", "static")))
+    assert read_own([file, "static", "--ros-args", *ros_args], "static").plan.ros.clock == clock
+
+
 def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

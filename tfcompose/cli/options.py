@@ -80,7 +80,8 @@ def add_ros_args(parser: ArgumentParser) -> None:
         nargs=1,
         default=[],
         metavar="…",
-        help="for all nodes of the robot: -r __ns:=NS, -r FROM:=TO, -p use_sim_time:=true",
+        help="for all nodes of the robot: -r __ns:=NS, -r FROM:=TO, -p use_sim_time:=true,"
+        " --log-level LEVEL",
     )
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from argparse import ArgumentTypeError
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from tfcompose.cli.options import namespace
 from tfcompose.cli.terminal import UNREADABLE, fail
+from tfcompose.model.plan import LogLevel
 from tfcompose.spec.language import RosArguments
 
 if TYPE_CHECKING:
@@ -25,9 +26,11 @@ def ros_arguments(argv: Sequence[str]) -> RosArguments:
         flag = rest.pop(0)
         rule = rest.pop(0) if rest and flag in _ROS_FLAGS else ""
         old, sign, new = rule.partition(":=")
-        if not sign or not old or not new:
+        if flag == _LEVEL_FLAG and rule.lower() in _LOG_LEVELS:
+            arguments = replace(arguments, level=_LOG_LEVELS[rule.lower()])
+        elif not sign or not old or not new:
             fail(f"--ros-args: {f'{flag} {rule}'.strip()} is not one of {_TAKEN}", UNREADABLE)
-        if flag in _REMAP_FLAGS and old == "__ns":
+        elif flag in _REMAP_FLAGS and old == "__ns":
             try:
                 arguments = replace(arguments, namespace=namespace(new))
             except ArgumentTypeError as error:
@@ -43,5 +46,7 @@ def ros_arguments(argv: Sequence[str]) -> RosArguments:
 
 
 _REMAP_FLAGS, _PARAM_FLAGS = frozenset({"-r", "--remap"}), frozenset({"-p", "--param"})
-_ROS_FLAGS = _REMAP_FLAGS | _PARAM_FLAGS
-_TAKEN = "-r __ns:=NAMESPACE, -r FROM:=TO and -p use_sim_time:=true"
+_LOG_LEVELS: dict[str, LogLevel] = {level: level for level in get_args(LogLevel)}
+_LEVEL_FLAG = "--log-level"
+_ROS_FLAGS = _REMAP_FLAGS | _PARAM_FLAGS | {_LEVEL_FLAG}
+_TAKEN = "-r __ns:=NAMESPACE, -r FROM:=TO, -p use_sim_time:=true and --log-level LEVEL"

@@ -9,6 +9,7 @@ does is named as ``module:attribute`` and loaded when it is used, so the table c
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import sys
@@ -320,7 +321,7 @@ def _may_hold_tools(folder: str) -> bool:
     Most installations have none, and ``importlib.metadata`` takes longer to load than all of
     ``--help``.
     """
-    section = f"[{GROUP}]"
+    section = f"[{GROUP}]".encode()
     try:
         with os.scandir(folder or ".") as entries:
             places = [entry.path for entry in entries if entry.name.endswith(_METADATA)]
@@ -329,12 +330,10 @@ def _may_hold_tools(folder: str) -> bool:
     except OSError:
         return False
     for place in places:
-        try:
-            text = Path(place, "entry_points.txt").read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
-            continue
-        if section in text:
-            return True
+        # Of some hundred packages, pathlib and decoding take 20 ms.
+        with contextlib.suppress(OSError), open(f"{place}/entry_points.txt", "rb") as file:  # noqa: PTH123
+            if section in file.read():
+                return True
     return False
 
 

@@ -39,6 +39,7 @@ from tfcompose.guard.joint_watch import JointWatch
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.ledger import MOST_UNDECLARED
 from tfcompose.guard.losses import LossWatch
+from tfcompose.guard.plan_parameters import PlanParameters
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.model.messages import Clear, TreeComplete
 from tfcompose.model.plan.file import read_plan
@@ -378,11 +379,12 @@ def guard(own: Own, stop: Stop) -> None:
         ready()
         CATALOGUE.load()
         diagnostics = DiagnosticsPage(node, own.plan.robot)
+        parameters = PlanParameters(node, own.plan)
         joints = JointWatch(node, own.plan, emit)
         losses = LossWatch(judged, emit)
         wrong = [losses.wrong, joints.wrong, *(judge.wrong for judge in judged)]
         silence = [judge.live.wrong for judge in judged]
-        reread = partial(_reread, own, judged, switches)
+        reread = partial(_reread, own, judged, switches, parameters)
         descriptions = Descriptions(node, emit)
         orders = OrderReader(
             judged, Gates(node, emit), Components(node, emit), descriptions, reread
@@ -396,6 +398,7 @@ def guard(own: Own, stop: Stop) -> None:
             events.heartbeat,
             events.flush,
             lambda: diagnostics.publish(judged, wrong, lambda: count_held_back(watches)),
+            lambda: parameters.check(judged, time.monotonic()),
         ]
         steps += [switches.check] if switches else []
         if ORDERS_FD not in os.environ:
@@ -421,7 +424,13 @@ def guard(own: Own, stop: Stop) -> None:
             watch.close()
 
 
-def _reread(own: Own, judges: Sequence[Judge], switches: Switches | None, file: str) -> None:
+def _reread(
+    own: Own,
+    judges: Sequence[Judge],
+    switches: Switches | None,
+    parameters: PlanParameters,
+    file: str,
+) -> None:
     """Switch the judges to the plan in the file, without a new guard."""
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
@@ -432,6 +441,7 @@ def _reread(own: Own, judges: Sequence[Judge], switches: Switches | None, file: 
         judge.follow(part)
     if switches:
         switches.follow(plan)
+    parameters.follow(plan)
 
 
 def _watches(

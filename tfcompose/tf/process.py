@@ -10,7 +10,8 @@ import contextlib
 import os
 import socket
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from select import select
 from typing import TYPE_CHECKING
@@ -25,7 +26,7 @@ from tfcompose.tf.ros.network import FirstNetwork
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from tfcompose.model.plan import Plan, PlanEdge, PlanProcess
+    from tfcompose.model.plan import Clock, Plan, PlanEdge, PlanProcess
 
 _ARGUMENTS = 2
 _CHECK_EVERY_S = 0.2
@@ -152,7 +153,22 @@ def read_own(argv: Sequence[str], kind: str) -> Own:
         raise _unfit(f"process {name} is of kind {process.kind}, not {kind}", file)
     if kind == "simulate" and process.simulate is None:
         raise _unfit(f"process {name} does not say what to simulate", file)
-    return Own(plan, process, Path(file), tuple(arguments[at + 1 :]))
+    ros_args = tuple(arguments[at + 1 :])
+    return Own(_with_clock(plan, ros_args), process, Path(file), ros_args)
+
+
+def _with_clock(plan: Plan, ros_args: Sequence[str]) -> Plan:
+    """Return the plan with the clock that ``-p use_sim_time:=…`` sets, if any does."""
+    values = [
+        value.lower()
+        for flag, rule in pairwise(ros_args)
+        for name, _, value in [rule.partition(":=")]
+        if flag in {"-p", "--param"} and name == "use_sim_time"
+    ]
+    if not values or values[-1] not in {"true", "false"}:
+        return plan
+    clock: Clock = "sim" if values[-1] == "true" else "wall"
+    return replace(plan, ros=replace(plan.ros, clock=clock))
 
 
 def _unfit(message: str, file: str) -> RejectedError:

@@ -75,12 +75,14 @@ def test_a_robot_file_is_a_launch_file_of_the_same_robot(
 
 
 def test_ros2_launch_shows_arguments_and_profiles(ros2_launch: Ros2Launch) -> None:
-    file = ros2_launch.write("rover.tfc.yaml", ROVER)
+    required = ROVER.replace("{default: 0.3, description", "{type: float, description")
+    file = ros2_launch.write("rover.tfc.yaml", required)
     launch = ros2_launch(file, "--show-args")
     assert launch.process.wait() == 0
     launch.close()
     shown = " ".join(launch.output.split())
-    assert "'height': how high the lidar is (default: '0.3')" in shown
+    assert "error" not in shown
+    assert "'height': how high the lidar is 'mode'" in shown
     assert "'mode': One of: ['fast', 'slow'] (default: 'fast')" in shown
     assert "'demo': apply the profile demo (default: 'false')" in shown
 
@@ -105,7 +107,12 @@ def test_findings_end_launch_and_are_printed_once(
     assert launch.process.wait() == 1
     launch.close()
     assert launch.output.count(f"rover.tfc.yaml:{place}: error[{code}]") == 1
+    assert launch.output.count("[ERROR]") == 1  # launch's own: of its exit code 1
     assert "Traceback" not in launch.output
+    listing = ros2_launch("rover.tfc.yaml", "--show-args")
+    assert listing.process.wait() == 0
+    listing.close()
+    assert listing.output.count(f"rover.tfc.yaml:{place}: error[{code}]") == 1
 
 
 def test_files_of_other_names_are_refused(ros2_launch: Ros2Launch) -> None:

@@ -57,6 +57,8 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
     return Plan(
         robot=robot.name,
         spec_digest=_digest(robot),
+        file=_relative(robot.file, robot.file),
+        profiles=robot.profiles,
         base=robot.base,
         ros=robot.ros,
         edges=edges,

@@ -51,15 +51,18 @@ def isolate(draft: Draft) -> Iterator[Finding]:
     robot, spec = draft.robot, draft.spec
     yield from _faults(robot, spec)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
-    rules = draft.validated.given.ros.remap
+    arguments = draft.validated.given.ros
+    rules = arguments.remap
     owners = {edge.owner for edge in robot.edges}
     processes = []
     filler = _ProcessFiller(draft)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
+        owns = process.name in owners
         if rules:
-            owns = process.name in owners
             moved = _remapped(moved, rules, robot.ros.namespace, owns=owns)
+        if arguments.level and process.is_node(owns=owns):
+            moved = moved.with_default_level(arguments.level)
         processes.append(filler.fill(moved))
     yield from filler.findings
     draft.robot = replace(robot, processes=tuple(processes))

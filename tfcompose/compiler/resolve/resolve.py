@@ -165,6 +165,7 @@ def assemble(draft: Draft) -> Iterator[Finding]:
         ),
         part_notes=draft.collected.notes,
         is_variant=spec.spans.is_variant,
+        profiles=spec.spans.profiles,
         zones=(*zones_of(spec), *(zone for part in in_tree for zone in part.zones)),
         limits=limits,
         conditions=validated.conditions,

@@ -479,6 +479,10 @@ class Plan:
     version: Literal[3] = field(default=VERSION, kw_only=True)
     robot: str
     spec_digest: str
+    #: The robot file's name.
+    file: str = field(default="", kw_only=True)
+    #: The profiles that are merged over the robot file, in order.
+    profiles: tuple[str, ...] = field(default=(), kw_only=True)
     description: str = field(default=DESCRIPTION, kw_only=True)
     base: str | None
     #: The host whose processes, those that are not ``external``, this plan starts. None: all;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.model.fields import narrow
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.foundation.findings import Span
-    from tfcompose.model.plan import LifecycleState
+    from tfcompose.model.plan import LifecycleState, LogLevel
 
 
 class AsInFile(str):
@@ -172,6 +172,12 @@ class Process(PlanProcess):
             or bool(self.remap.keys() - set(GLOBAL))
             or "--ros-args" in self.argv
         )
+
+    def with_default_level(self, level: LogLevel) -> Process:
+        """Return the process with this log level, if it is a program without its own."""
+        if self.log_level or self.kind != "run" or self.launch is not None:
+            return self
+        return replace(self, log_level=level)
 
     @property
     def node(self) -> str:

@@ -218,6 +218,8 @@ class Robot:
     part_notes: dict[str, list[Note]] = field(default_factory=dict, compare=False)
     #: Whether profiles or overlays are merged over the file.
     is_variant: bool = field(default=False, compare=False)
+    #: The names of the merged profiles, in order.
+    profiles: tuple[str, ...] = field(default=(), compare=False)
     #: Zones that sensors have to see.
     zones: tuple[Zone, ...] = ()
     #: The file's limits of codes, instead of the defaults.

@@ -19,6 +19,7 @@ from tfcompose.foundation.units import (
     quantity,
     with_article,
 )
+from tfcompose.model.plan import LogLevel
 from tfcompose.spec.language.expressions import IDENTIFIER, Value, insertable_text
 from tfcompose.spec.language.spec import Checked, key
 from tfcompose.spec.language.values import Text, VariableName, plain
@@ -59,6 +60,8 @@ class RosArguments:
     remap: Mapping[str, str] = field(default_factory=dict)
     #: Whether nodes follow /clock; None: as the robot file says.
     use_sim_time: bool | None = None
+    #: The log level of nodes whose process has none; None: ROS's default.
+    level: LogLevel | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,7 +74,9 @@ def compose(
         result = _lay_over_all(
             replace(base, findings=(*base.findings, *refused)), source, profiles, overlays
         )
-    return replace(result, is_variant=bool(profiles or overlays))
+    return replace(
+        result, is_variant=bool(profiles or overlays), profiles=tuple(dict.fromkeys(profiles))
+    )
 
 
 def _lay_over_all(

@@ -41,6 +41,8 @@ class Spans:
     )
     #: Whether profiles or overlays are merged over the file.
     is_variant: bool = field(default=False, compare=False, kw_only=True)
+    #: The names of the merged profiles, in order.
+    profiles: tuple[str, ...] = field(default=(), compare=False, kw_only=True)
 
     def span_of(self, path: Path) -> Span:
         """Return the value's place, or that of the nearest mapping or list around it."""

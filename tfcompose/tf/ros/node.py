@@ -109,9 +109,12 @@ def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterato
         context.init(args=["--ros-args", *args] if args else [], initialize_logging=False)
         node = _node(context, name, namespace)
         widen_buffers()
-    except (RuntimeError, NameValidationException) as error:
+    except (RuntimeError, NameValidationException, InvalidParameterTypeException) as error:
         context.try_shutdown()
-        raise RosError(f"ROS cannot start a node: {' '.join(str(error).split())}") from None
+        unknown = isinstance(error, _rclpy.UnknownROSArgsError)
+        what = "unknown ROS arguments " if unknown else ""
+        reason = " ".join(str(error).split())
+        raise RosError(f"ROS cannot start a node: {what}{reason}") from None
     try:
         yield node
     finally:

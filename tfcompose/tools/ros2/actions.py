@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+from logging import ERROR
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, List  # noqa: UP035 (see _CHILDREN)
 
@@ -32,6 +33,7 @@ from tfcompose.tools.ros2.events import (
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
+    from logging import LogRecord
 
     from launch import LaunchContext
     from launch.events.process import ProcessExited
@@ -141,6 +143,8 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
             OnProcessExit(target_action=self, on_exit=self._end, handle_once=True)
         )
         started = super().execute(context)
+        logger = launch.logging.get_logger(self.process_details["name"])
+        logger.addFilter(lambda record: context.is_shutdown or not _is_death(record))
         if context.is_shutdown:
             self._events.close()
         else:
@@ -258,6 +262,11 @@ class _EventPipe:
         """Remove the file, which is not needed once both ends are open."""
         with contextlib.suppress(OSError):
             self.path.unlink(missing_ok=True)
+
+
+def _is_death(record: LogRecord) -> bool:
+    """Return whether launch reports a failed process, as ``RobotFailedError`` does."""
+    return record.levelno == ERROR and record.getMessage().startswith("process has died")
 
 
 def _ros_arguments(context: LaunchContext) -> list[str]:

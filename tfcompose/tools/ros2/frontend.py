@@ -6,6 +6,8 @@ other names at once.
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import TYPE_CHECKING, Any
 
 from launch import LaunchDescription, Substitution, frontend
@@ -13,10 +15,11 @@ from launch.actions import DeclareLaunchArgument
 from launch.conditions import evaluate_condition_expression
 from launch.substitutions import EnvironmentVariable, LaunchConfiguration
 
+from tfcompose.foundation.findings import RejectedError
 from tfcompose.tools.ros2.actions import TfCompose
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from typing import TextIO
 
     from launch import LaunchContext
@@ -72,7 +75,8 @@ class RobotFileParser(frontend.Parser):  # type: ignore[misc]  # as above
             profiles=[_NameIfTrue(profile, argument) for profile, argument in names.items()],
             args={name: LaunchConfiguration(name) for name in args},
         )
-        return LaunchDescription(
+        return RobotDescription(
+            entity.path,
             [
                 *(_declare(name, arg) for name, arg in args.items()),
                 *(
@@ -82,8 +86,25 @@ class RobotFileParser(frontend.Parser):  # type: ignore[misc]  # as above
                     for profile, argument in names.items()
                 ),
                 robot,
-            ]
+            ],
         )
+
+
+class RobotDescription(LaunchDescription):  # type: ignore[misc]  # as above
+    """A robot file's launch description, which lints the file where its arguments are listed."""
+
+    def __init__(self, file: str, entities: Iterable[Any]) -> None:
+        super().__init__(entities)
+        self._file = file
+
+    def get_launch_arguments(self, conditional_inclusion: bool = False) -> list[Any]:  # noqa: FBT001, FBT002 (launch's signature)
+        """Return the launch arguments, and print the file's findings to stderr.
+
+        ``ros2 launch --show-args`` calls this; a launch does not.
+        """
+        _print_findings(self._file)
+        arguments: list[Any] = super().get_launch_arguments(conditional_inclusion)
+        return arguments
 
 
 class _NameIfTrue(Substitution):  # type: ignore[misc]  # as above
@@ -106,12 +127,35 @@ class _NameIfTrue(Substitution):  # type: ignore[misc]  # as above
 def _interface(file: str) -> tuple[Mapping[str, ArgSpec], tuple[str, ...]]:
     """Return the arguments and the names of the profiles; none where the file has findings."""
     from tfcompose.cli.args import args_and_profiles
-    from tfcompose.foundation.findings import RejectedError
 
     try:
         return args_and_profiles(file)
     except RejectedError:
         return {}, ()
+
+
+def _print_findings(file: str) -> None:
+    """Print the findings of a robot file to stderr; a required argument may lack a value."""
+    from tfcompose.cli.compiling import library
+    from tfcompose.cli.linting import Linter
+    from tfcompose.cli.parser import parser_of
+    from tfcompose.cli.reading import read_text
+    from tfcompose.cli.terminal import print_findings
+    from tfcompose.spec.language import with_includes
+    from tfcompose.spec.load import load
+
+    linter = Linter(parser_of("lint").parse_args([file]), library(), os.environ, has_one_file=True)
+    try:
+        source = with_includes(load(read_text(file), file), read_text)
+    except RejectedError as error:
+        print_findings(error.findings, sys.stderr)
+        return
+    declared = {source.key_span(("args", name)) for name in source.mapping("args")}
+    findings = linter.lint_robot(file, read_text)
+    print_findings(
+        [each for each in findings if each.code != "TF102" or each.span not in declared],
+        sys.stderr,
+    )
 
 
 def _argument_of(profile: str, args: Mapping[str, Any]) -> str:

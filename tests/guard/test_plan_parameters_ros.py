@@ -155,6 +155,7 @@ profiles: {demo: {frames: {mast: {parent: base_link, xyz: [1, 0, 0]}}}}
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ros2") is None, reason="there is no ros2 param")
 def test_ros2_param_reads_them(domain: Domain, tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(ROBOT, "utf-8")

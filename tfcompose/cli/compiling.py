@@ -24,14 +24,23 @@ from tfcompose.cli.terminal import (
     printable,
     reject,
 )
-from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.compile import Compiled, compile_source
 from tfcompose.compiler.resolve import Library
 from tfcompose.compiler.urdf.inertia import UnmeasurableError
 from tfcompose.compiler.urdf.packages import FETCH, Disk
 from tfcompose.foundation.findings import RejectedError, Span, did_you_mean, finding
 from tfcompose.foundation.reach import Reach
-from tfcompose.foundation.reading import is_file, is_folder
-from tfcompose.spec.language import Given, GivenArg, set_value, with_includes
+from tfcompose.foundation.reading import is_file, is_folder, names_in
+from tfcompose.spec.language import (
+    Given,
+    GivenArg,
+    find_overlay,
+    load_robot_overlay,
+    overlay_folder,
+    robots_with_overlay,
+    set_value,
+    with_includes,
+)
 from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
@@ -131,16 +140,38 @@ def _ament_prefixes() -> tuple[str, ...]:
     return tuple(prefix for prefix in prefixes if prefix)
 
 
-def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) -> list[Source]:
-    """Return the overlays of --overlay and --set, in that order.
+def overlays_of(
+    arguments: Namespace, read: Callable[[str], str] = read_text, source: Source | None = None
+) -> list[Source]:
+    """Return the overlays of --robot, --overlay and --set, in that order.
 
-    ``read`` returns a file's text.
+    ``read`` returns a file's text. ``source`` is the robot file, which names the folder of the
+    overlays of single robots; without it there are none of --robot.
 
     Raises:
         RejectedError: if a file cannot be read or is not YAML, or a setting is malformed.
     """
     files = [with_includes(load(read(file), file), read) for file in arguments.overlays]
-    return [*files, *(set_value(setting) for setting in arguments.settings)]
+    overlays = [*files, *(set_value(setting) for setting in arguments.settings)]
+    path = _robot_overlay(arguments, source) if source else None
+    return [load_robot_overlay(path, read), *overlays] if path else overlays
+
+
+def _robot_overlay(arguments: Namespace, source: Source) -> str | None:
+    """Return the overlay of --robot, or of this computer for a command that starts robots.
+
+    Raises:
+        RejectedError: if the named robot has none.
+    """
+    folder = overlay_folder(source)
+    files = names_in(folder) if folder and is_folder(folder) else []
+    robot = getattr(arguments, "overlay_robot", None)
+    if robot is not None:
+        return find_overlay(source, robot, files)
+    here = os.uname().nodename
+    if getattr(arguments, "by_hostname", False) and here in robots_with_overlay(files):
+        return find_overlay(source, here, files)
+    return None
 
 
 def disk_of(file: str, arguments: Namespace) -> Disk:
@@ -180,16 +211,15 @@ def compile_without_errors(
         SystemExit: after printing its errors.
     """
     try:
-        overlays = overlays_of(arguments)
-        compiled = compile_robot(
-            read_text(file),
-            file,
+        source = with_includes(load(read_text(file), file), read_text)
+        compiled = compile_source(
+            source,
             library(),
             arguments.profiles,
-            overlays=overlays,
-            read=read_text,
-            disk=disk_of(file, arguments),
-            given=inputs_of(arguments, day),
+            overlays_of(arguments, source=source),
+            read_text,
+            disk_of(file, arguments),
+            inputs_of(arguments, day),
         )
     except RejectedError as error:
         reject(error.findings)

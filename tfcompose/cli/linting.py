@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.cli.terminal import warn
 from tfcompose.foundation.findings import Note
+from tfcompose.foundation.reading import is_folder, names_in
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from tfcompose.compiler.compile import Compiled
     from tfcompose.compiler.resolve import Disk, Library
@@ -35,6 +36,7 @@ class _LintFiles(NamedTuple):
     #: For the file and its includes.
     disk_of: Callable[[Source], Disk]
     environment_of: Callable[[Source], Mapping[str, str]]
+    is_folder: Callable[[str], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ class Linter:
         files = self._files_of(file, read)
         try:
             source = with_includes(load(files.read(file), file), files.read)
-            overlays = overlays_of(self.arguments, files.read)
+            overlays = overlays_of(self.arguments, files.read, source)
         except RejectedError as error:
             return list(error.findings)
         given = replace(inputs_of(self.arguments), environment=files.environment_of(source))
@@ -73,7 +75,7 @@ class Linter:
         requested = self.arguments.profiles
         findings, judged = variants.in_combinations(requested)
         if not requested and not overlays:
-            findings += variants.with_each_profile(findings, judged)
+            findings += variants.with_each_variant(findings, judged)
         return sorted(findings, key=lambda finding: finding.sort_key)
 
     def lint_urdf(self, file: str, read: Callable[[str], str]) -> list[Finding]:
@@ -97,7 +99,7 @@ class Linter:
             from tfcompose.cli.compiling import disk
 
             files = disk(trusts_files=self.arguments.trust, sources=[file])
-            return _LintFiles(read, self.presets, lambda _: files, lambda _: os.environ)
+            return _LintFiles(read, self.presets, lambda _: files, lambda _: os.environ, is_folder)
         from tfcompose.cli.untrusted import UntrustedFiles, declared_variables
 
         untrusted = UntrustedFiles(file, read)
@@ -108,6 +110,7 @@ class Linter:
             untrusted.library(),
             untrusted.disk_for,
             lambda source: declared_variables(source, self.environment),
+            untrusted.is_folder,
         )
 
 
@@ -152,24 +155,23 @@ class _Variants:
         findings = merge_findings([(values, compiled.findings) for values, compiled in judged])
         return findings, [compiled for _, compiled in judged]
 
-    def with_each_profile(
+    def with_each_variant(
         self, findings: Sequence[Finding], judged: Sequence[Compiled]
     ) -> list[Finding]:
-        """Return the findings that each profile adds, and unused allow comments."""
+        """Return the findings that each profile and overlay of a robot adds.
+
+        Also unused allow comments.
+        """
         from tfcompose.compiler.check import unused_allows
-        from tfcompose.spec.language import profiles_in
 
         known = {_identity(finding) for finding in findings}
         # A profile that lays over another key of an entry moves the place of what was found there.
         messages = {_judgement(finding) for finding in findings} - {None}
         more: list[Finding] = []
         variants = list(judged)
-        for profile, inside in profiles_in(self.source).items():
-            if "when" in inside and self.source.has(("args",)):
-                continue  # it is laid over where its condition holds
-            variant = self._compile(self.given, [profile])
+        for option, variant in self._each_variant():
             variants.append(variant)
-            note = Note(f"with --profile {profile}")
+            note = Note(f"with {option}")
             new = [
                 finding
                 for finding in variant.findings
@@ -184,12 +186,40 @@ class _Variants:
             more += unused_allows(self.source.allows, used)
         return more
 
-    def _compile(self, given: Given, profiles: Sequence[str]) -> Compiled:
+    def _each_variant(self) -> Iterator[tuple[str, Compiled]]:
+        """Yield the robot with each profile, then with each robot's overlay, by its option."""
+        from tfcompose.compiler.compile import Compiled
+        from tfcompose.foundation.findings import RejectedError
+        from tfcompose.spec.language import (
+            find_overlay,
+            load_robot_overlay,
+            overlay_folder,
+            profiles_in,
+            robots_with_overlay,
+        )
+
+        for profile, inside in profiles_in(self.source).items():
+            if "when" not in inside or not self.source.has(("args",)):
+                yield f"--profile {profile}", self._compile(self.given, [profile])
+        folder = overlay_folder(self.source)
+        files = names_in(folder) if folder and self.files.is_folder(folder) else []
+        for robot in robots_with_overlay(files):
+            path = find_overlay(self.source, robot, files)
+            try:
+                overlays = [load_robot_overlay(path, self.files.read)]
+            except RejectedError as error:
+                yield f"--robot {robot}", Compiled(None, error.findings)
+            else:
+                yield f"--robot {robot}", self._compile(self.given, [], overlays)
+
+    def _compile(
+        self, given: Given, profiles: Sequence[str], more: Sequence[Source] = ()
+    ) -> Compiled:
         from tfcompose.compiler.compile import compile_source
 
         read, presets = self.files.read, self.files.presets
         return compile_source(
-            self.source, presets, profiles, self.overlays, read, self.disk, given
+            self.source, presets, profiles, (*more, *self.overlays), read, self.disk, given
         )
 
 

@@ -73,6 +73,22 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
     add_trust(parser)
 
 
+def add_robot_overlay(
+    parser: ArgumentParser, default: str = "", *, by_hostname: bool = False
+) -> None:
+    """Add --robot, which names the overlay of a robot.
+
+    With ``by_hostname`` the default is the overlay of this computer, if it has one.
+    """
+    parser.add_argument(
+        "--robot",
+        metavar="NAME",
+        dest="overlay_robot",
+        help=f"merge NAME.yaml from the folder under overlays:; default: {default or 'none'}",
+    )
+    parser.set_defaults(by_hostname=by_hostname)
+
+
 def add_ros_args(parser: ArgumentParser) -> None:
     """Add --ros-args, with the rest of the command line or the part before ``--``."""
     parser.add_argument(

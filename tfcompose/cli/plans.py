@@ -53,7 +53,7 @@ def read_built_plan(file: Path) -> Plan:
 
 
 def refuse_variant(arguments: Namespace, *more: str) -> None:
-    """Refuse --profile, --overlay, --set and arguments with a built plan.
+    """Refuse --profile, --robot, --overlay, --set and arguments with a built plan.
 
     Raises:
         SystemExit: after reporting that.
@@ -62,9 +62,16 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
         arguments.profiles
         or arguments.overlays
         or arguments.settings
+        or getattr(arguments, "overlay_robot", None)
         or any(getattr(arguments, option) for option in more)
     ):
-        *options, last = ["--profile", "--overlay", "--set", *(f"--{option}" for option in more)]
+        *options, last = [
+            "--profile",
+            "--robot",
+            "--overlay",
+            "--set",
+            *(f"--{option}" for option in more),
+        ]
         fail(
             f"a built plan takes no {', '.join(options)} or {last}: these options apply at"
             " build time",

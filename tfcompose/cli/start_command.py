@@ -6,7 +6,14 @@ import errno
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_ros_args, add_variant, not_negative, positive
+from tfcompose.cli.options import (
+    DEFAULT_FILE,
+    add_robot_overlay,
+    add_ros_args,
+    add_variant,
+    not_negative,
+    positive,
+)
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -20,6 +27,7 @@ def add_start_arguments(parser: ArgumentParser, *, guard_alone: bool = False) ->
         "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
     )
     add_variant(parser)
+    add_robot_overlay(parser, "HOSTNAME.yaml, if there is one", by_hostname=True)
     add_ros_args(parser)
     parser.add_argument(
         "-o", "--output", metavar="DIR", help="where to build; default: build/ROBOT"

@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from tfcompose.launcher.output import EventStream
     from tfcompose.launcher.runtime_dir import RuntimeDir
     from tfcompose.model.plan import Plan
+    from tfcompose.spec.load import Source
 
 
 def load_forker(arguments: Namespace) -> Forker | None:
@@ -249,7 +250,7 @@ def _profiles_that_start(arguments: Namespace) -> str:
         source = with_includes(load(read_text(arguments.file), arguments.file), read_text)
         names = [name for name in profiles_in(source) if name not in arguments.profiles]
         for others in dict.fromkeys(((), tuple(arguments.profiles))):
-            fitting = [name for name in names if _starts_with([*others, name], arguments)]
+            fitting = [name for name in names if _starts_with(source, [*others, name], arguments)]
             if fitting:
                 return " --profile ".join([*others, " or ".join(fitting)])
     except RejectedError:
@@ -257,20 +258,19 @@ def _profiles_that_start(arguments: Namespace) -> str:
     return ""
 
 
-def _starts_with(profiles: Sequence[str], arguments: Namespace) -> bool:
+def _starts_with(source: Source, profiles: Sequence[str], arguments: Namespace) -> bool:
     from tfcompose.cli.compiling import inputs_of, library, overlays_of
-    from tfcompose.compiler.compile import compile_robot
+    from tfcompose.compiler.compile import compile_source
     from tfcompose.compiler.emit.plan import plan_of
 
-    overlays, given = overlays_of(arguments), inputs_of(arguments)
-    file, presets = arguments.file, library()
-    compiled = compile_robot(
-        read_text(file), file, presets, profiles, overlays=overlays, read=read_text, given=given
-    )
+    overlays, given = overlays_of(arguments, source=source), inputs_of(arguments)
+    compiled = compile_source(source, library(), profiles, overlays, read_text, given=given)
     if compiled.robot is None or compiled.errors:
         return False
     plan = plan_of(compiled.robot)
-    return not commands_of(plan, plan.managed, Path(file), os.environ, child_environment)[1]
+    return not commands_of(
+        plan, plan.managed, Path(arguments.file), os.environ, child_environment
+    )[1]
 
 
 def _detach(

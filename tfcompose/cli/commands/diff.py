@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 import math
+from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.cli.options import add_format, add_variant
+from tfcompose.cli.terminal import UNREADABLE, fail
 from tfcompose.foundation.geometry import angle_between, norm
 
 if TYPE_CHECKING:
@@ -27,8 +29,14 @@ TURNED_RAD = 1e-6
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("old", metavar="OLD", help="a robot file")
-    parser.add_argument("new", metavar="NEW", help="the same robot, changed")
+    parser.add_argument("new", nargs="?", metavar="NEW", help="the same robot, changed")
     add_variant(parser, "apply this profile to both")
+    parser.add_argument(
+        "--robots",
+        nargs=2,
+        metavar=("A", "B"),
+        help="instead of NEW: compare OLD with the overlays of two robots",
+    )
     add_format(parser)
 
 
@@ -47,9 +55,15 @@ def run(arguments: Namespace) -> int:
     """Print the differences; exit code 0 without any, 1 with some."""
     from tfcompose.cli.compiling import compile_or_exit
 
-    found = differences(
-        compile_or_exit(arguments.old, arguments), compile_or_exit(arguments.new, arguments)
-    )
+    if (arguments.new is None) == (arguments.robots is None):
+        fail("diff takes OLD NEW, or OLD --robots A B", UNREADABLE)
+    sides = []
+    for index in range(2):
+        file = arguments.new if index and arguments.new else arguments.old
+        side = copy(arguments)
+        side.overlay_robot = arguments.robots[index] if arguments.robots else None
+        sides.append(compile_or_exit(file, side))
+    found = differences(*sides)
     if arguments.format == "json":
         print(
             json.dumps(

@@ -11,7 +11,7 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_robot_overlay, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def arguments(parser: ArgumentParser) -> None:
         help="print all codes, or those of one family, as a Markdown table",
     )
     add_variant(parser)
+    add_robot_overlay(parser)
 
 
 def run(arguments: Namespace) -> int:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
-from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_format, add_robot_overlay, add_variant
 from tfcompose.cli.robot_search import YAML_ENDINGS, is_robot, robots_in
 from tfcompose.cli.terminal import (
     CLEAR,
@@ -62,6 +62,7 @@ def arguments(parser: ArgumentParser) -> None:
         help="check FILE as a URDF or xacro file, whatever its suffix; repeatable",
     )
     add_variant(parser, "check only with this profile")
+    add_robot_overlay(parser, "each robot of the folder in turn")
     add_format(parser, "json", "sarif", "github", "junit")
     parser.add_argument(
         "--fix", action="store_true", help="apply unambiguous fixes to the named files"

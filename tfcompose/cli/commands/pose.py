@@ -10,7 +10,7 @@ import sys
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_file, add_format, add_frames, add_variant
+from tfcompose.cli.options import add_file, add_format, add_frames, add_robot_overlay, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail
 from tfcompose.foundation.geometry import Pose
 
@@ -25,6 +25,7 @@ def arguments(parser: ArgumentParser) -> None:
     add_file(parser)
     add_frames(parser)
     add_variant(parser)
+    add_robot_overlay(parser)
     add_format(parser)
 
 

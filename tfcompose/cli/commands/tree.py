@@ -18,6 +18,7 @@ from tfcompose.cli.options import (
     add_for,
     add_format,
     add_namespace,
+    add_robot_overlay,
     add_variant,
     settle_duration,
 )
@@ -44,6 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
         "file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag"
     )
     add_variant(parser)
+    add_robot_overlay(parser)
     parser.add_argument("--live", action="store_true", help="print the tree that is published now")
     add_bag(parser, "print the tree of a recording")
     add_for(parser, "with --live: observe for S seconds; default: 3")

@@ -18,6 +18,7 @@ from tfcompose.cli.options import (
     add_bag,
     add_for,
     add_format,
+    add_robot_overlay,
     add_tolerance,
     add_variant,
     settle_duration,
@@ -42,6 +43,7 @@ def arguments(parser: ArgumentParser) -> None:
         help="default: the robot that runs in this ROS domain, or robot.yaml",
     )
     add_variant(parser)
+    add_robot_overlay(parser)
     parser.add_argument(
         "--running",
         action="store_true",
@@ -101,7 +103,13 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
     """
     from tfcompose.cli.runs import plan_of_domain
 
-    changed = arguments.profiles or arguments.overlays or arguments.settings or arguments.given
+    changed = (
+        arguments.profiles
+        or arguments.overlay_robot
+        or arguments.overlays
+        or arguments.settings
+        or arguments.given
+    )
     if arguments.running and (arguments.file or arguments.bag or changed):
         fail("--running takes the plan of the robot that runs: no FILE, --bag or --profile")
     if arguments.file or arguments.bag or changed:

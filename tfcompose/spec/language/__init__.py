@@ -17,6 +17,12 @@ from tfcompose.spec.language.overlay import (
 )
 from tfcompose.spec.language.pose import DIRECTIONS
 from tfcompose.spec.language.recognition import is_recognized, load_named
+from tfcompose.spec.language.robot_overlays import (
+    find_overlay,
+    load_robot_overlay,
+    overlay_folder,
+    robots_with_overlay,
+)
 from tfcompose.spec.language.validate import (
     Validated,
     levels_of,
@@ -34,11 +40,15 @@ __all__ = [
     "Validated",
     "as_part",
     "compose",
+    "find_overlay",
     "is_recognized",
     "lay_over",
     "levels_of",
     "load_named",
+    "load_robot_overlay",
+    "overlay_folder",
     "profiles_in",
+    "robots_with_overlay",
     "set_value",
     "validate",
     "validate_file",

@@ -510,6 +510,17 @@ class RosSpec(RosSettings):
     )
 
 
+class RobotOverlays(Entry):
+    """Overlays of single robots, so that one robot file serves several of them."""
+
+    by: Literal["hostname"] = key(
+        "hostname", "the name of a robot: the hostname of its computer", "hostname"
+    )
+    folder: Text = key(
+        "overlays", "folder of the overlays, HOSTNAME.yaml, relative to this file", "overlays"
+    )
+
+
 class RobotSpec(Spec):
     """One robot."""
 
@@ -600,6 +611,11 @@ class RobotSpec(Spec):
         {},
         "named overlays, chosen with --profile",
         {"demo": {"sensors": {"laser": {"driver": "none"}}}},
+    )
+    overlays: RobotOverlays | None = key(
+        None,
+        "overlays of single robots, chosen with --robot, by up from the hostname",
+        {"by": "hostname", "folder": "overlays"},
     )
     guard: GuardPolicy = key(GuardPolicy(), "the checks of the live tree", {"mode": "strict"})
     preset_path: OneOrMore = key(

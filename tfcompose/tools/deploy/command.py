@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_file, add_variant, positive
+from tfcompose.cli.options import add_file, add_robot_overlay, add_variant, positive
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, printable, reject
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_file(parser)
     add_variant(parser)
+    add_robot_overlay(parser)
     parser.add_argument(
         "--check", action="store_true", help="change nothing; exit 1 if something would change"
     )

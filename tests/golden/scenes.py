@@ -86,7 +86,7 @@ from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import share_of
 from tfcompose.model.robot import Robot
 from tfcompose.model.robot.body import Asset
-from tfcompose.spec.language import set_value
+from tfcompose.spec.language import find_overlay, load_robot_overlay, set_value
 from tfcompose.spec.language.tool_keys import problems_with
 from tfcompose.spec.load import Source, load
 from tfcompose.tf.bags import BagError
@@ -807,6 +807,12 @@ def compiled() -> Iterator[Finding]:
     """Compile robots with presets that are wrong, and with what is not installed."""
     for setting in ("a", "=1"):
         yield from _refused(partial(set_value, setting))
+    many = load(f"{HEAD}overlays: {{by: hostname, folder: units}}\n", "robot.yaml")
+    for file in ([], ["ant.yaml"]):
+        yield from _refused(partial(find_overlay, many, "an", file))
+    yield from _refused(partial(find_overlay, load(HEAD, "robot.yaml"), "ant", ()))
+    overlay = "overlays: {by: hostname, folder: units}\n"
+    yield from _refused(partial(load_robot_overlay, "units/ant.yaml", lambda _: overlay))
     robot = f"{HEAD}preset_path: presets\nsensors: {{s: {{preset: %s, parent: base_link}}}}\n"
     with TemporaryDirectory() as folder, inside(folder):
         for name, text in {

@@ -32,6 +32,8 @@ NOT_OF_A_LINE |= {"TF720", "TF721", "TF722"}
 NOT_OF_A_LINE |= {"TF726"}
 #: Of what xacro may not do: tests/compiler/urdf/test_confined_xacro.py.
 NOT_OF_A_LINE |= {"TF021", "TF022"}
+#: Of the folder of overlays: tests/cli/test_robot_overlays.py.
+NOT_OF_A_LINE |= {"TF023"}
 #: Of what is imported: tests/tools/importers/test_shell.py.
 NOT_OF_A_LINE |= {"TF020"}
 #: Codes of the running robot, of its plan and of its surroundings.

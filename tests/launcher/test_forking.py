@@ -137,6 +137,33 @@ def test_a_forked_process_ends_with_its_launcher(tmp_path: Path) -> None:
     assert until(lambda: gone(pid))
 
 
+@pytest.mark.parametrize("way", ["forked", "on terminals"])
+def test_a_start_without_free_descriptors_leaves_none_open(way: str, tmp_path: Path) -> None:
+    code = f"""
+import resource
+from tfcompose.model.plan import PlanProcess
+def attempt():
+    if "{way}" == "forked":
+        return start("forked", "pass")
+    process = PlanProcess("screen", "run", emulate_tty=True)
+    return spawn(ChildCommand(("true",), dict(os.environ), Path.cwd(), process=process), ())
+def descriptors():
+    return sorted(os.listdir("/proc/self/fd"))
+soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+before, free = descriptors(), os.dup(0)
+os.close(free)
+for spare in (1, 2, 3):
+    resource.setrlimit(resource.RLIMIT_NOFILE, (free + spare, hard))
+    try:
+        attempt()
+    except OSError:
+        print("refused")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+print(descriptors() == before)
+"""
+    assert run_launcher(tmp_path, code) == ["refused"] * 3 + ["True"]
+
+
 @pytest.fixture
 def forker(monkeypatch: pytest.MonkeyPatch) -> Iterator[Forker]:
     monkeypatch.setattr(os, "environ", dict(ENVIRONMENT))  # pytest writes into it

@@ -292,10 +292,9 @@ def _on_terminals(
     Raises:
         OSError: if it cannot be started.
     """
-    (out, its_out), (err, its_err) = os.openpty(), os.openpty()
-    for fd in (out, err):
-        fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", *TERMINAL_SIZE, 0, 0))
-    try:
+    with output_pairs(os.openpty) as ((out, its_out), (err, its_err)):
+        for fd in (out, err):
+            fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", *TERMINAL_SIZE, 0, 0))
         popen = subprocess.Popen(
             command.argv,
             cwd=command.folder,
@@ -307,15 +306,32 @@ def _on_terminals(
             start_new_session=True,
             preexec_fn=before_the_program,  # noqa: PLW1509 (the launcher has one thread)
         )
-    except BaseException:
-        os.close(out)
-        os.close(err)
-        raise
-    finally:
-        os.close(its_out)
-        os.close(its_err)
     popen.stdout, popen.stderr = os.fdopen(out, "rb", 0), os.fdopen(err, "rb", 0)
     return popen
+
+
+@contextlib.contextmanager
+def output_pairs(
+    open_pair: Callable[[], tuple[int, int]],
+) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Open a pair of descriptors for a child's output and another for its errors.
+
+    In each pair the launcher's end is first. After the block the child's ends are closed, and the
+    launcher's too if the block failed.
+
+    Raises:
+        OSError: if a pair cannot be opened; the other is closed.
+    """
+    with contextlib.ExitStack() as child_ends, contextlib.ExitStack() as launcher_ends:
+
+        def opened() -> tuple[int, int]:
+            launcher_end, child_end = open_pair()
+            launcher_ends.callback(os.close, launcher_end)
+            child_ends.callback(os.close, child_end)
+            return launcher_end, child_end
+
+        yield opened(), opened()
+        launcher_ends.pop_all()
 
 
 def has_ended(pid: int) -> bool:

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from tfcompose.foundation import procfs
 from tfcompose.foundation.signals import SIGNALS
-from tfcompose.launcher.child import end_with
+from tfcompose.launcher.child import end_with, output_pairs
 from tfcompose.launcher.kernel_settings import has_settings
 from tfcompose.launcher.program import HERE
 
@@ -104,23 +104,16 @@ class Forker:
         Raises:
             OSError: if it cannot be forked.
         """
-        out, its_out = os.pipe()
-        err, its_err = os.pipe()
         launcher = os.getpid()
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
-        try:
-            with self._tracing.forked():
-                pid = os.fork()
-            if pid == 0:
-                self._become(command, launcher, (its_out, its_err), pass_fds, mask)
-        except BaseException:
-            os.close(out)
-            os.close(err)
-            raise
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-            os.close(its_out)
-            os.close(its_err)
+        with output_pairs(os.pipe) as ((out, its_out), (err, its_err)):
+            mask = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+            try:
+                with self._tracing.forked():
+                    pid = os.fork()
+                if pid == 0:
+                    self._become(command, launcher, (its_out, its_err), pass_fds, mask)
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         return ForkedProcess(pid, out, err)
 
     def _become(

@@ -74,7 +74,7 @@ def test_a_mounts_xyz_has_the_forms_of_the_way() -> None:
     validated = validate(source)
     assert validated.spec.sensors["c"].xyz == xyz
     draft, _ = resolve(validated, library())
-    (edge,) = [edge for edge in draft.robot.edges if edge.given]
+    (edge,) = [edge for edge in draft.robot.edges if edge.declared]
     assert edge.pose.xyz == xyz
     plan = read_plan(write_plan(plan_of(draft.robot)), "plan.json")
     (planned,) = [planned for planned in plan.edges if planned.child == edge.child]

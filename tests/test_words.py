@@ -228,10 +228,9 @@ def names_in(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, int]]:
                 pass
 
 
-#: Names of variables that say nothing of what they hold. ``given`` is left: what somebody gives
-#: the arguments of a robot file is ``Given``. Tests deal with words of a text, too.
+#: Names of variables that say nothing of what they hold. Tests deal with words of a text, too.
 EMPTY_NAMES = {
-    "tfcompose": {"one", "ones", "several", "word", "meant"},
+    "tfcompose": {"one", "ones", "several", "word", "meant", "given"},
     "tests": {"one", "ones", "several", "meant"},
 }
 

@@ -15,7 +15,7 @@ from tfcompose.cli.reading import read_text
 from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.foundation.findings import Span
 from tfcompose.model.robot import AsInFile, Robot
-from tfcompose.spec.language import Given, GivenArg
+from tfcompose.spec.language import ArgValue, BuildInputs
 from tfcompose.spec.load import load
 
 #: ROS's own launch reads launch files, and comes with a distribution only.
@@ -37,9 +37,9 @@ def import_of(source: Path, *words: str, code: int | None = 0) -> tuple[str, dic
 
 def compiled(text: str, folder: Path, **args: str) -> Compiled:
     """Compile a robot file with the values of its arguments."""
-    given = Given({name: GivenArg(value, Span("test")) for name, value in args.items()})
+    inputs = BuildInputs({name: ArgValue(value, Span("test")) for name, value in args.items()})
     return compile_robot(
-        text, str(folder / "imported.yaml"), PRESETS, read=read_text, disk=disk(), given=given
+        text, str(folder / "imported.yaml"), PRESETS, read=read_text, disk=disk(), inputs=inputs
     )
 
 

@@ -11,7 +11,7 @@ from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, printable, reject
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.spec.language import Given, compose, profiles_in, validate, with_includes
+from tfcompose.spec.language import BuildInputs, compose, profiles_in, validate, with_includes
 from tfcompose.spec.language.args import as_given
 from tfcompose.spec.load import load
 
@@ -53,7 +53,7 @@ def args_and_profiles(
     source = with_includes(load(read_text(file), file), read_text)
     names = tuple(profiles_in(source))
     source = compose(source, profiles, overlays, read=read_text)
-    return validate(source, given=Given({}, os.environ)).spec.args, names
+    return validate(source, inputs=BuildInputs({}, os.environ)).spec.args, names
 
 
 def _file(arguments: Namespace) -> str:

@@ -60,17 +60,17 @@ class Parser(ArgumentParser):
         """
         argv = list(args or ())
         ros_args: list[str] = []
-        takes_given = any(action.dest == "given" for action in self._actions)
+        takes_args = any(action.dest == "arg_values" for action in self._actions)
         if any(action.dest == "ros_args" for action in self._actions):
             argv, ros_args = split_ros_args(argv)
-        settings, rest = self._settings(argv) if takes_given else ([], argv)
+        settings, rest = self._settings(argv) if takes_args else ([], argv)
         if ros_args:
             namespace = Namespace(**vars(namespace or Namespace()), ros_args=ros_args)
         arguments = super().parse_intermixed_args(rest, namespace)
-        if takes_given:
+        if takes_args:
             from tfcompose.cli.options import pairs
 
-            arguments.given = pairs([*settings, *arguments.given], ":=")
+            arguments.arg_values = pairs([*settings, *arguments.arg_values], ":=")
         return arguments
 
     def _settings(self, argv: Sequence[str]) -> tuple[list[str], list[str]]:

@@ -32,8 +32,8 @@ from tfcompose.foundation.findings import RejectedError, Span, did_you_mean, fin
 from tfcompose.foundation.reach import Reach
 from tfcompose.foundation.reading import is_file, is_folder, names_in
 from tfcompose.spec.language import (
-    Given,
-    GivenArg,
+    ArgValue,
+    BuildInputs,
     find_overlay,
     load_robot_overlay,
     overlay_folder,
@@ -179,7 +179,7 @@ def disk_of(file: str, arguments: Namespace) -> Disk:
     return disk(trusts_files=arguments.trust, sources=[file])
 
 
-def inputs_of(arguments: Namespace, day: date | None = None) -> Given:
+def inputs_of(arguments: Namespace, day: date | None = None) -> BuildInputs:
     """Return the robot's inputs from command line and environment.
 
     ``day`` is the one whose calibrations apply; None: those that still hold.
@@ -188,9 +188,10 @@ def inputs_of(arguments: Namespace, day: date | None = None) -> Given:
         SystemExit: after reporting wrong ROS arguments.
     """
     args = {
-        name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()
+        name: ArgValue(value, Span(f"{name}:={value}"))
+        for name, value in arguments.arg_values.items()
     }
-    return Given(args, os.environ, ros_arguments(getattr(arguments, "ros_args", ())), day)
+    return BuildInputs(args, os.environ, ros_arguments(getattr(arguments, "ros_args", ())), day)
 
 
 def compile_or_exit(file: str, arguments: Namespace, day: date | None = None) -> Robot:

@@ -204,7 +204,7 @@ def _processes(_: Sequence[str]) -> list[str]:
 _SOURCES: dict[tuple[str, str], Source] = {
     ("", "profiles"): _profiles,
     ("", "robot"): _robots,
-    ("", "given"): _settings_in,
+    ("", "arg_values"): _settings_in,
     ("up", "host"): _hosts,
     ("", "a"): _frames,
     ("", "b"): _frames,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.compile import Compiled
     from tfcompose.compiler.resolve import Disk, Library
     from tfcompose.foundation.findings import Finding, Span
-    from tfcompose.spec.language import Given
+    from tfcompose.spec.language import BuildInputs
     from tfcompose.spec.language.arguments import Combination
     from tfcompose.spec.load import Source
 
@@ -67,11 +67,11 @@ class Linter:
             overlays = overlays_of(self.arguments, files.read, source)
         except RejectedError as error:
             return list(error.findings)
-        given = replace(inputs_of(self.arguments), environment=files.environment_of(source))
+        inputs = replace(inputs_of(self.arguments), environment=files.environment_of(source))
         if not self.has_one_file:  # an argument is one of any of the files
-            names = given.args.keys() & source.mapping("args").keys()
-            given = replace(given, args={name: given.args[name] for name in names})
-        variants = _Variants(source, overlays, given, files, files.disk_of(source))
+            names = inputs.args.keys() & source.mapping("args").keys()
+            inputs = replace(inputs, args={name: inputs.args[name] for name in names})
+        variants = _Variants(source, overlays, inputs, files, files.disk_of(source))
         requested = self.arguments.profiles
         findings, judged = variants.in_combinations(requested)
         if not requested and not overlays:
@@ -91,7 +91,7 @@ class Linter:
         else:
             files = disk(trusts_files=self.arguments.trust)
         packages = Packages(files, advice="source the workspace's setup file")
-        return lint_urdf(file, packages, self.arguments.given)
+        return lint_urdf(file, packages, self.arguments.arg_values)
 
     def _files_of(self, file: str, read: Callable[[str], str]) -> _LintFiles:
         """Return all files of this machine; with --untrusted, those of the robot's tree."""
@@ -120,22 +120,22 @@ class _Variants:
 
     source: Source
     overlays: Sequence[Source]
-    given: Given
+    inputs: BuildInputs
     files: _LintFiles
     disk: Disk
 
     def in_combinations(self, profiles: Sequence[str]) -> tuple[list[Finding], list[Compiled]]:
         """Return findings and compiled robots for each combination of argument values."""
         if not self.source.has(("args",)) and not self.overlays:
-            alone = self._compile(self.given, profiles)
+            alone = self._compile(self.inputs, profiles)
             return list(alone.findings), [alone]
         from tfcompose.foundation.findings import RejectedError, Span
-        from tfcompose.spec.language import GivenArg, compose
+        from tfcompose.spec.language import ArgValue, compose
         from tfcompose.spec.language.arguments import alternatives_of, combinations
 
         try:
-            laid_over = compose(self.source, profiles, self.overlays, self.given, self.files.read)
-            alternatives, first = alternatives_of(laid_over, self.given, self.source)
+            laid_over = compose(self.source, profiles, self.overlays, self.inputs, self.files.read)
+            alternatives, first = alternatives_of(laid_over, self.inputs, self.source)
         except RejectedError as error:
             return list(error.findings), []
         judged = []
@@ -148,10 +148,10 @@ class _Variants:
                     f" in {JUDGE_FOR_S:g} s and skipped the others"
                 )
                 break
-            args = dict(self.given.args)
+            args = dict(self.inputs.args)
             for name, value in values.items():
-                args[name] = GivenArg(value, Span(f"{name}:={value}"))
-            judged.append((values, self._compile(replace(self.given, args=args), profiles)))
+                args[name] = ArgValue(value, Span(f"{name}:={value}"))
+            judged.append((values, self._compile(replace(self.inputs, args=args), profiles)))
         findings = merge_findings([(values, compiled.findings) for values, compiled in judged])
         return findings, [compiled for _, compiled in judged]
 
@@ -200,7 +200,7 @@ class _Variants:
 
         for profile, inside in profiles_in(self.source).items():
             if "when" not in inside or not self.source.has(("args",)):
-                yield f"--profile {profile}", self._compile(self.given, [profile])
+                yield f"--profile {profile}", self._compile(self.inputs, [profile])
         folder = overlay_folder(self.source)
         files = names_in(folder) if folder and self.files.is_folder(folder) else []
         for robot in robots_with_overlay(files):
@@ -210,16 +210,16 @@ class _Variants:
             except RejectedError as error:
                 yield f"--robot {robot}", Compiled(None, error.findings)
             else:
-                yield f"--robot {robot}", self._compile(self.given, [], overlays)
+                yield f"--robot {robot}", self._compile(self.inputs, [], overlays)
 
     def _compile(
-        self, given: Given, profiles: Sequence[str], more: Sequence[Source] = ()
+        self, inputs: BuildInputs, profiles: Sequence[str], more: Sequence[Source] = ()
     ) -> Compiled:
         from tfcompose.compiler.compile import compile_source
 
         read, presets = self.files.read, self.files.presets
         return compile_source(
-            self.source, presets, profiles, (*more, *self.overlays), read, self.disk, given
+            self.source, presets, profiles, (*more, *self.overlays), read, self.disk, inputs
         )
 
 

@@ -64,7 +64,7 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         "--show-args", action="store_true", help="print the robot file's arguments and exit"
     )
     parser.add_argument(
-        "given",
+        "arg_values",
         nargs="*",
         default=[],
         metavar="NAME:=VALUE",

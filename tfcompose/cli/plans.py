@@ -79,10 +79,10 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
         )
     if getattr(arguments, "ros_args", ()):
         fail("a built plan takes no --ros-args: pass them to build", UNREADABLE)
-    if arguments.given:
+    if arguments.arg_values:
         built_with = "; tfcompose up --dry-run PLAN prints the arguments of its build"
         fail(
-            f"{next(iter(arguments.given))}:=…: a built plan takes no arguments{built_with}",
+            f"{next(iter(arguments.arg_values))}:=…: a built plan takes no arguments{built_with}",
             UNREADABLE,
         )
 

@@ -263,8 +263,8 @@ def _starts_with(source: Source, profiles: Sequence[str], arguments: Namespace) 
     from tfcompose.compiler.compile import compile_source
     from tfcompose.compiler.emit.plan import plan_of
 
-    overlays, given = overlays_of(arguments, source=source), inputs_of(arguments)
-    compiled = compile_source(source, library(), profiles, overlays, read_text, given=given)
+    overlays, inputs = overlays_of(arguments, source=source), inputs_of(arguments)
+    compiled = compile_source(source, library(), profiles, overlays, read_text, inputs=inputs)
     if compiled.robot is None or compiled.errors:
         return False
     plan = plan_of(compiled.robot)

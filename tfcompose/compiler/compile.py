@@ -10,7 +10,7 @@ from tfcompose.compiler.resolve import Disk, Library, resolve
 from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Allow, Finding, RejectedError, without_duplicates
 from tfcompose.spec.language import (
-    Given,
+    BuildInputs,
     compose,
     levels_of,
     profiles_in,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Robot
 
 
-NOTHING = Given()
+NOTHING = BuildInputs()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +58,12 @@ def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
     overlays: Sequence[Source] = (),
     read: Callable[[str], str] | None = None,
     disk: Disk | None = None,
-    given: Given = NOTHING,
+    inputs: BuildInputs = NOTHING,
 ) -> Compiled:
     """Return the robot with profiles and overlays merged, and all findings by place.
 
     ``read`` returns the text of an included file or a calibration; without it no file can be read.
-    ``disk`` tells which files and packages exist; without it meshes are not looked up. ``given``
+    ``disk`` tells which files and packages exist; without it meshes are not looked up. ``inputs``
     has the values of the robot's arguments and the environment, which is empty by default.
     """
     try:
@@ -71,7 +71,7 @@ def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
         source = with_includes(source, read) if read else source
     except RejectedError as error:
         return Compiled(None, error.findings)
-    return compile_source(source, library, profiles, overlays, read, disk, given)
+    return compile_source(source, library, profiles, overlays, read, disk, inputs)
 
 
 def compile_source(  # noqa: PLR0913, PLR0917 (as above)
@@ -81,12 +81,12 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     overlays: Sequence[Source] = (),
     read: Callable[[str], str] | None = None,
     disk: Disk | None = None,
-    given: Given = NOTHING,
+    inputs: BuildInputs = NOTHING,
 ) -> Compiled:
     """Return the result of ``compile_robot`` for a text that is loaded, with its includes."""
     try:
         validated = validate(
-            compose(source, profiles, overlays, given, read), profiles_in(source), given
+            compose(source, profiles, overlays, inputs, read), profiles_in(source), inputs
         )
     except RejectedError as error:
         return Compiled(None, error.findings)

@@ -46,7 +46,7 @@ def _given_values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Sourc
     for source in sources:
         for entry in _entries(edge, source):
             data = source.mapping(*entry)
-            if data and (source.span_of((*entry, "parent")) == edge.span or not edge.given):
+            if data and (source.span_of((*entry, "parent")) == edge.span or not edge.declared):
                 yield from ((source, (*entry, key), data[key]) for key in _KEYS if key in data)
                 return
 
@@ -70,7 +70,7 @@ def _entries(edge: Edge, source: Source) -> Iterator[Path]:
             else filter(entries.__contains__, ends)
         )
         for entry in known:
-            yield (section, entry) if edge.given else (section, entry, "frames", edge.child)
+            yield (section, entry) if edge.declared else (section, entry, "frames", edge.child)
 
 
 def _show_value(value: Any) -> str:

@@ -40,7 +40,7 @@ class Own:
     process: PlanProcess
     file: Path
     #: The arguments after ``--ros-args`` on its command line.
-    given: tuple[str, ...]
+    extra_ros_args: tuple[str, ...]
 
     @property
     def node_name(self) -> str:
@@ -59,7 +59,7 @@ class Own:
         Those of the command line come first, then the plan's remappings.
         """
         return [
-            *self.given,
+            *self.extra_ros_args,
             *(
                 argument
                 for old, new in self.process.remap.items()

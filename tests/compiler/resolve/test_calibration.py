@@ -18,7 +18,7 @@ from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.foundation.findings import Span
 from tfcompose.foundation.geometry import Pose, angle_between
 from tfcompose.model.robot import Edge
-from tfcompose.spec.language import Given
+from tfcompose.spec.language import BuildInputs
 from tfcompose.spec.language.calibration import read_calibration
 
 #: A robot of two metres, so that no measured pose is outside of it; every sensor is inside.
@@ -364,8 +364,8 @@ def compiled_on(day: str | None, robot: str) -> Compiled:
         f"{name}.yaml": autoware().replace("0.12", x)
         for name, x in zip("abc", ("0.12", "0.13", "0.14"), strict=True)
     }
-    inputs = Given(day=date.fromisoformat(day) if day else None)
-    return compile_robot(HEAD + robot, "r.yaml", library(), read=reader(texts), given=inputs)
+    inputs = BuildInputs(day=date.fromisoformat(day) if day else None)
+    return compile_robot(HEAD + robot, "r.yaml", library(), read=reader(texts), inputs=inputs)
 
 
 @pytest.mark.parametrize("robot", MOUNTS.values(), ids=MOUNTS)

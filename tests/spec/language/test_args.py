@@ -14,7 +14,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.foundation.findings import Span
-from tfcompose.spec.language import Given, GivenArg
+from tfcompose.spec.language import ArgValue, BuildInputs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,12 +33,12 @@ def built(
     files: Mapping[str, str] = NOTHING,
     profiles: tuple[str, ...] = (),
 ) -> Compiled:
-    given = Given(
-        {name: GivenArg(value, Span(f"{name}:={value}")) for name, value in args.items()},
+    inputs = BuildInputs(
+        {name: ArgValue(value, Span(f"{name}:={value}")) for name, value in args.items()},
         environment,
     )
     return compile_robot(
-        HEAD + text, "r.yaml", library(), profiles, read=dict(files).__getitem__, given=given
+        HEAD + text, "r.yaml", library(), profiles, read=dict(files).__getitem__, inputs=inputs
     )
 
 

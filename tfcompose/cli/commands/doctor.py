@@ -129,7 +129,7 @@ def _plan(arguments: Namespace) -> Plan | None:
 
     if arguments.file is not None:
         return expected_plan(arguments.file, arguments)[0]
-    if arguments.profiles or arguments.overlays or arguments.settings or arguments.given:
+    if arguments.profiles or arguments.overlays or arguments.settings or arguments.arg_values:
         fail("--profile, --overlay, --set and NAME:=VALUE need a robot file", UNREADABLE)
     return plan_of_domain()
 

@@ -94,7 +94,7 @@ def _line(edge: Edge, sources: Sequence[Source]) -> str:
     from tfcompose.compiler.render.tree import edge_facts
 
     facts = edge_facts(edge)
-    inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
+    inside = f" (inside {edge.sensor})" if edge.sensor and not edge.declared else ""
     measured = f"          {_explain_calibration(edge.calibration)}\n" if edge.calibration else ""
     values = "".join(f"          {line}\n" for line in values_of(edge, sources))
     at = f"          {edge.span}{inside}\n" if inside or not values else ""

@@ -108,7 +108,7 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
         or arguments.overlay_robot
         or arguments.overlays
         or arguments.settings
-        or arguments.given
+        or arguments.arg_values
     )
     if arguments.running and (arguments.file or arguments.bag or changed):
         fail("--running takes the plan of the robot that runs: no FILE, --bag or --profile")

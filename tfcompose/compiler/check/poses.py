@@ -294,7 +294,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
     mounts = [
         norm(edge.pose.xyz)
         for edge in robot.edges
-        if edge.given and edge.child in below and any(edge.pose.xyz)
+        if edge.declared and edge.child in below and any(edge.pose.xyz)
     ]
     limit = min(
         max(_USUAL_M, _TIMES * body, _TIMES * sorted(mounts)[len(mounts) // 2] if mounts else 0.0),

@@ -214,7 +214,9 @@ _TURNED_RAD = 0.02
 def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
     kinds = {sensor.name: sensor.kind for sensor in robot.sensors}
     mounts = [
-        edge for edge in robot.edges if edge.given and edge.sensor in kinds and edge.pose != Pose()
+        edge
+        for edge in robot.edges
+        if edge.declared and edge.sensor in kinds and edge.pose != Pose()
     ]
     first: dict[tuple[object, ...], Edge] = {}
     for edge in mounts:
@@ -239,7 +241,7 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
 def mount_copied(robot: Robot) -> Iterator[Finding]:
     mounts: dict[str, Edge] = {}
     for edge in robot.edges:
-        if not edge.given:
+        if not edge.declared:
             continue
         others = [mounts[name] for name in twins(edge.child) if name in mounts]
         twin = next((other for other in others if are_mirrored(other, edge)), None)
@@ -268,7 +270,7 @@ def sides_swapped(robot: Robot) -> Iterator[Finding]:
         base = poses.get(edge.parent)
         is_fixed = edge.joint.type == "continuous" if edge.joint else edge.kind == "static"
         if (
-            not edge.given
+            not edge.declared
             or not is_fixed
             or base is None
             or angle_between(base.quat_xyzw, IDENTITY_XYZW) > _TURNED_RAD

@@ -101,7 +101,7 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
         return did_you_mean(name, [candidate for candidate in near if candidate != child], declare)
 
     for edge in robot.edges:
-        for parent in (edge.parent, *edge.switched) if edge.given else ():
+        for parent in (edge.parent, *edge.switched) if edge.declared else ():
             if parent not in robot.frames and parent not in invalid and not robot.excuses(parent):
                 message = f"{edge.child}: unknown parent frame {parent}"
                 section = "links" if parent in moved else "frames"

@@ -236,7 +236,7 @@ def _claim_of(sensor: MountedSensor) -> dict[str, Any]:
 
 def _driven_sensor(sensor: MountedSensor, robot: Robot) -> Driven:
     switch = _claim_of(sensor) if sensor.publishes else _switch(sensor)
-    inside = (edge for edge in robot.edges if edge.sensor == sensor.name and not edge.given)
+    inside = (edge for edge in robot.edges if edge.sensor == sensor.name and not edge.declared)
     frames: dict[str, PoseKnowledge] = {
         edge.child: _knowledge(edge) for edge in inside if edge.owner == sensor.driver
     }

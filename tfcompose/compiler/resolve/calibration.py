@@ -150,7 +150,7 @@ class _Calibrations:
         validated = self.draft.validated
         if any(refused[: len(path)] == path for refused in validated.refused):
             return []
-        day = validated.given.day
+        day = validated.inputs.day
         valid = [at for at, calibration in enumerate(declared) if calibration.holds(day)]
         if declared and not valid:
             names = ", ".join(calibration.file for calibration in declared)
@@ -173,7 +173,7 @@ class _Calibrations:
         """Report that a mount has several calibrations for one day."""
         first, second = valid[:2]
         files = ", ".join(declared[position].file for position in valid)
-        day = self.draft.validated.given.day
+        day = self.draft.validated.inputs.day
         message = f"{name} has several calibrations valid {f'on {day}' if day else 'now'}: {files}"
         notes = [Note("the other one", self._span(path, first))]
         advice = "end the older one: valid: {to: DAY}"

@@ -123,7 +123,7 @@ class _Claims:
         claims = (*(preset.publishes if preset else ()), *by_hand)
         roles = Roles(self.robot, process.name, preset, claims)
         claimant = Claimant(
-            process, node, claims, preset=preset, roles=roles, given=node.flat_params
+            process, node, claims, preset=preset, roles=roles, params=node.flat_params
         )
         self._set_names(claimant)
         for claim in self._of_one(claimant) if preset and preset.one_of else claims:
@@ -165,9 +165,9 @@ class _Claims:
             if described.parameter is None or frame is None:
                 continue
             parameter = described.parameter
-            if described.instead in claimant.given:
+            if described.instead in claimant.params:
                 parameter = described.instead
-            own = claimant.given.get(parameter)
+            own = claimant.params.get(parameter)
             if own is not None and not claimant.roles.is_bound(role) and self._is_frame(own):
                 continue  # the tree leaves it open
             self._set(claimant, parameter, self.robot.final(frame))
@@ -178,7 +178,7 @@ class _Claims:
         return any(name == self.robot.final(frame) for frame in self.robot.frames)
 
     def _set(self, claimant: Claimant, key: str, value: Any) -> None:
-        own = claimant.given.get(key)
+        own = claimant.params.get(key)
         if own is None:
             claimant.computed[key] = value
         elif own != value:
@@ -226,7 +226,7 @@ class _Claims:
     def _compare_rate(self, claimant: Claimant, edge: Edge) -> None:
         """Find a parameter by which the node sends its edge less often than is declared."""
         preset = claimant.preset
-        key, rate = preset.rate_in(claimant.given) if preset else ("", math.inf)
+        key, rate = preset.rate_in(claimant.params) if preset else ("", math.inf)
         if edge.rate and edge.is_slower(rate):
             message = f"{key} of {claimant.process.name} gives {edge.name} {rate:.3g} Hz, but"
             message += f" {edge.rate:g} Hz is declared"
@@ -258,10 +258,10 @@ class _Claims:
     def _switch_off(self, claimant: Claimant, claim: ClaimSpec, name: str, other: Edge) -> None:
         """Write the switch, or say that it cannot be written."""
         against = next(
-            (key for key, off in claim.off.items() if claimant.given.get(key, off) != off), None
+            (key for key, off in claim.off.items() if claimant.params.get(key, off) != off), None
         )
         if against is not None and claimant.takes_parameters and not claimant.has(claim.on):
-            value = claimant.given[against]
+            value = claimant.params[against]
             message = (
                 f"{against} of {claimant.process.name} is {value!r}, and {other.owner} owns"
                 f" {other.name}"
@@ -346,17 +346,16 @@ class _Claims:
 
 @dataclass(slots=True)
 class Claimant:
-    """One node that may publish TF.
-
-    Known facts about it, the parameters a user gave it, and those tfcompose adds.
-    """
+    """One node that may publish TF."""
 
     process: Process
     node: Node
     claims: tuple[ClaimSpec, ...]
     preset: NodePresetSpec | None
     roles: Roles
-    given: dict[str, Any]
+    #: The parameters in the robot file.
+    params: dict[str, Any]
+    #: The parameters that tfcompose adds.
     computed: dict[str, Any] = field(default_factory=dict)
     contradicting: set[str] = field(default_factory=set)
 
@@ -371,7 +370,7 @@ class Claimant:
 
     def has(self, params: dict[str, Any]) -> bool:
         """Return whether the user gave exactly these parameters."""
-        return bool(params) and all(self.given.get(key) == value for key, value in params.items())
+        return bool(params) and all(self.params.get(key) == value for key, value in params.items())
 
     def is_published(self, claim: ClaimSpec) -> bool:
         """Return whether the node publishes the edge with the user's parameters."""

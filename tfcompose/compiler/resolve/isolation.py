@@ -51,7 +51,7 @@ def isolate(draft: Draft) -> Iterator[Finding]:
     robot, spec = draft.robot, draft.spec
     yield from _faults(robot, spec)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
-    arguments = draft.validated.given.ros
+    arguments = draft.validated.inputs.ros
     rules = arguments.remap
     owners = {edge.owner for edge in robot.edges}
     processes = []

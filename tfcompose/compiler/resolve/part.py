@@ -12,7 +12,7 @@ from tfcompose.foundation.findings import Finding, RejectedError, did_you_mean, 
 from tfcompose.model.fields import narrow
 from tfcompose.model.plan import RosSettings
 from tfcompose.model.robot import Part
-from tfcompose.spec.language import GivenArg, as_part
+from tfcompose.spec.language import ArgValue, as_part
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
@@ -91,11 +91,11 @@ class PartEntry:
             RosSettings, ros, namespace=namespace, frame_prefix=f"{self.outer_prefix}{self.prefix}"
         )
 
-    def given_args(self) -> dict[str, GivenArg]:
+    def given_args(self) -> dict[str, ArgValue]:
         """Return the values that the holder gives the part's arguments."""
         path = (*self.path, "args")
         return {
-            name: GivenArg(value, self.spec.span_of((*path, name)))
+            name: ArgValue(value, self.spec.span_of((*path, name)))
             for name, value in self.declared.args.items()
         }
 

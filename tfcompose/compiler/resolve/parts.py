@@ -15,7 +15,7 @@ from tfcompose.compiler.resolve.isolation import settings_of
 from tfcompose.compiler.resolve.part import PartEntry
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.model.robot import STATIC
-from tfcompose.spec.language import Given, compose, load_named, validate, with_includes
+from tfcompose.spec.language import BuildInputs, compose, load_named, validate, with_includes
 from tfcompose.spec.load import find_path
 
 if TYPE_CHECKING:
@@ -87,9 +87,9 @@ def _validate_part(part: PartEntry, named: str, draft: Draft, read: Reader) -> V
         raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", span)])
     loaded = with_includes(load_named(read(file), file), read)
     draft.collected.notes.setdefault(file, []).append(_note(part))
-    holder = draft.validated.given
-    inputs = Given(part.given_args(), holder.environment, day=holder.day)
-    source = compose(loaded, part.declared.profiles, given=inputs)
+    holder = draft.validated.inputs
+    inputs = BuildInputs(part.given_args(), holder.environment, day=holder.day)
+    source = compose(loaded, part.declared.profiles, inputs=inputs)
     validated = validate(part.overlay_on(source), None, inputs)
     part.findings += _useless(part, file, validated)
     draft.collected.allows += validated.source.allows

@@ -241,7 +241,7 @@ class _Solver:
             if edge.kind != "static" and self._is_broken(index):
                 raise _UnsolvableError(None)
             if edge.kind != "static" and not (
-                edge.sensor and not edge.given
+                edge.sensor and not edge.declared
             ):  # a driver may send it again and again
                 note = Note(f"{edge.name} is published by {edge.owner}", edge.span)
                 what = (

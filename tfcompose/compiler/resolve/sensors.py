@@ -114,7 +114,7 @@ class _Mounting:
             owner=owner,
             pose=pose,
             span=self.span_of(),
-            given=False,
+            declared=False,
             sensor=self.sensor.name,
             nominal=nominal,
             other_axes=frame.other_axes,

@@ -316,7 +316,7 @@ def joint_type(edge: Edge) -> str:
         return joint.type
     # A sensor is one body, even where its driver sends what was calibrated inside it again and
     # again.
-    inside = edge.sensor and not edge.given
+    inside = edge.sensor and not edge.declared
     return "floating" if edge.kind == "dynamic" and not inside else "fixed"
 
 

@@ -185,7 +185,8 @@ class Edge(PlanEdge):
     #: Where the edge is declared.
     span: Span = field(kw_only=True)
     joint_name: str = field(default="", kw_only=True)
-    given: bool = field(default=True, kw_only=True)
+    #: Whether the robot file declares it; the frames inside a sensor come from its preset.
+    declared: bool = field(default=True, kw_only=True)
     #: The path of the mapping that declares it; for an edge inside a part it begins with the
     #: part's own.
     entry: tuple[str | int, ...] = field(default=(), compare=False, kw_only=True)

@@ -6,7 +6,7 @@ The models are the one description of validation, JSON Schema and reference. ``o
 sources, ``validate`` makes a ``RobotSpec`` of one.
 """
 
-from tfcompose.spec.language.args import ArgSpec, Given, GivenArg, RosArguments
+from tfcompose.spec.language.args import ArgSpec, ArgValue, BuildInputs, RosArguments
 from tfcompose.spec.language.overlay import (
     as_part,
     compose,
@@ -34,8 +34,8 @@ from tfcompose.spec.language.validate import (
 __all__ = [
     "DIRECTIONS",
     "ArgSpec",
-    "Given",
-    "GivenArg",
+    "ArgValue",
+    "BuildInputs",
     "RosArguments",
     "Validated",
     "as_part",

@@ -37,13 +37,12 @@ _CALLED: dict[ArgType, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class GivenArg:
-    """A value that an argument is given, and where.
+class ArgValue:
+    """The value of an argument."""
 
-    On the command line and in the environment it is a text.
-    """
-
+    #: From the command line and the environment it is a text.
     value: Any
+    #: Where it comes from.
     span: Span
 
 
@@ -65,10 +64,10 @@ class RosArguments:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class BuildInputs:
     """What a robot file is built with: values of its arguments by name, and the environment."""
 
-    args: Mapping[str, GivenArg] = field(default_factory=dict)
+    args: Mapping[str, ArgValue] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
     ros: RosArguments = field(default_factory=RosArguments)
     #: The day, in UTC, whose calibrations apply; None: those that still hold.
@@ -188,20 +187,20 @@ class ArgSpec(Checked):
         except ArgError as error:
             yield ("default",), invalid(error.code, str(error), error.advice)
 
-    def value(self, given: Any) -> Value:
-        """Return what an expression has for a value that is given, or is the default.
+    def value(self, raw: Any) -> Value:
+        """Return the value of an argument as expressions have it, from a raw value or the default.
 
         Raises:
             ArgError: if the argument cannot have it.
         """
-        value = self.convert(given)
+        value = self.convert(raw)
         if self.choices:
             choices = [self.convert(choice) for choice in self.choices]
             if value not in choices:
                 texts = [as_given(choice) for choice in self.choices]
                 raise ArgError(
                     "TF106",
-                    f"{format_value(given)} is not one of the choices",
+                    f"{format_value(raw)} is not one of the choices",
                     _one_of(insertable_text(value), texts),
                 )
         for bound, sign, what in ((self.min, 1, "less"), (self.max, -1, "greater")):
@@ -212,7 +211,7 @@ class ArgSpec(Checked):
                 and sign * (value.value - limit.value) < 0
             ):
                 raise ArgError(
-                    "TF106", f"{format_value(given)} is {what} than {bound}", self._range()
+                    "TF106", f"{format_value(raw)} is {what} than {bound}", self._range()
                 )
         return value
 
@@ -223,17 +222,17 @@ class ArgSpec(Checked):
         ]
         return ", ".join(filter(None, bounds))
 
-    def convert(self, given: Any) -> Value:
+    def convert(self, raw: Any) -> Value:
         """Return the value as one of the argument's type.
 
         Raises:
             ArgError: if it is of another type.
         """
         kind = self.kind
-        given = plain(given)
-        read = _read(given) if isinstance(given, str) and kind != "string" else given
-        if kind == "string" and isinstance(given, str):
-            return given
+        raw = plain(raw)
+        read = _read(raw) if isinstance(raw, str) and kind != "string" else raw
+        if kind == "string" and isinstance(raw, str):
+            return raw
         if kind == "bool" and isinstance(read, bool):
             return read
         number = read if isinstance(read, Quantity) else None
@@ -247,14 +246,14 @@ class ArgSpec(Checked):
         ):
             return Quantity(int(number.value))
         if number and kind == "float":
-            self._refuse_dimension(number, given)
+            self._refuse_dimension(number, raw)
             return (
                 Quantity(float(number.value)) if number.dimension == NUMBER else number
             )  # a node's double
         advice = {"bool": "true or false", "string": "put it in quotes"}.get(kind, "")
-        raise ArgError("TF103", f"{format_value(given)} is not {_CALLED[kind]}", advice)
+        raise ArgError("TF103", f"{format_value(raw)} is not {_CALLED[kind]}", advice)
 
-    def _refuse_dimension(self, number: Quantity, given: Any) -> None:
+    def _refuse_dimension(self, number: Quantity, raw: Any) -> None:
         known = (self.default, *self.choices, self.min, self.max)
         own = [
             found.dimension
@@ -265,7 +264,7 @@ class ArgSpec(Checked):
         if number.dimension not in {NUMBER, other}:
             raise ArgError(
                 "TF104",
-                f"{format_value(given)} is {with_article(number.dimension)},"
+                f"{format_value(raw)} is {with_article(number.dimension)},"
                 f" not {with_article(other)}",
             )
 

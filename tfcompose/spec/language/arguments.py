@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from tfcompose.spec.language.args import ArgSpec, Given, full
+from tfcompose.spec.language.args import ArgSpec, BuildInputs, full
 from tfcompose.spec.language.expressions import Value, constant, evaluate, insertable_text, parse
 from tfcompose.spec.language.variables import Variables, unused_variables
 
@@ -70,9 +70,9 @@ def _new_pairs(
 
 
 def alternatives_of(
-    source: Source, given: Given, aside: Source
+    source: Source, inputs: BuildInputs, aside: Source
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Return the possible values of used arguments that are not given.
+    """Return the possible values of used arguments that have no value yet.
 
     Both are by name, as the command line gives them. ``aside`` is the file with its profiles,
     which may use them too.
@@ -82,10 +82,10 @@ def alternatives_of(
         for section, name in unused_variables(source.data, aside.data.get("profiles"))
         if section == "args"
     }
-    variables = Variables(source, given)
+    variables = Variables(source, inputs)
     alternatives: dict[str, tuple[str, ...]] = {}
     for name, raw in source.mapping("args").items():
-        if raw is None or name in idle or name in given.args:
+        if raw is None or name in idle or name in inputs.args:
             continue
         try:
             alternatives[name] = ArgSpec.model_validate(full(raw)).alternatives

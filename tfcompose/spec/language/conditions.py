@@ -214,10 +214,14 @@ class _Unfolding:
                 'for: {i: "${range(3)}"}, or for: {side: [left, right]}',
             )
         for name in loops:
-            if name in self.variables.given or name in RESERVED or not IDENTIFIER.fullmatch(name):
+            if (
+                name in self.variables.declared
+                or name in RESERVED
+                or not IDENTIFIER.fullmatch(name)
+            ):
                 what = (
                     "a variable already"
-                    if name in self.variables.given
+                    if name in self.variables.declared
                     else RESERVED.get(name, "not a name")
                 )
                 raise ExpressionError(

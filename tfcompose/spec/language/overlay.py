@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
 from tfcompose.foundation.text import list_names
-from tfcompose.spec.language.args import Given
+from tfcompose.spec.language.args import BuildInputs
 from tfcompose.spec.language.conditions import holds
 from tfcompose.spec.language.expressions import ExpressionError
 from tfcompose.spec.language.recognition import load_named
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     Reader = Callable[[str], str]
 
 
-_NOTHING = Given()
+_NOTHING = BuildInputs()
 
 
 def compose(
     source: Source,
     profiles: Sequence[str] = (),
     overlays: Sequence[Source] = (),
-    given: Given = _NOTHING,
+    inputs: BuildInputs = _NOTHING,
     read: Reader | None = None,
 ) -> Source:
     """Return the robot with its named profiles laid over it, in order, then the overlays.
@@ -49,8 +49,8 @@ def compose(
     Without ``profiles``. With ``read``, which gives a file's text, a profile that is missing is
     looked for in the parts.
 
-    Before the named ones come those whose own condition, ``when``, holds for what is ``given`` to
-    the others. An overlay may bring profiles of its own.
+    Before the named ones come those whose own condition, ``when``, holds with the ``inputs`` and
+    the named ones. An overlay may bring profiles of its own.
 
     Raises:
         RejectedError: if a profile is not there.
@@ -69,7 +69,7 @@ def compose(
     base = replace(without(source, "profiles"), findings=(*source.findings, *wrong))
     result = _lay_over_all(base, source, profiles, overlays)
     if any(isinstance(profile, dict) and "when" in profile for profile in known.values()):
-        holding, refused = _holding(source, result, given)
+        holding, refused = _holding(source, result, inputs)
         profiles = [*(name for name in holding if name not in profiles), *profiles]
         result = _lay_over_all(
             replace(base, findings=(*base.findings, *refused)), source, profiles, overlays
@@ -91,9 +91,11 @@ def _lay_over_all(
     return base
 
 
-def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], list[Finding]]:
+def _holding(
+    source: Source, others: Source, inputs: BuildInputs
+) -> tuple[list[str], list[Finding]]:
     """Return the profiles whose conditions hold, and what is wrong with conditions."""
-    variables = Variables(others, given)
+    variables = Variables(others, inputs)
     names: list[str] = []
     findings = []
     for name, profile in profiles_in(source).items():
@@ -305,7 +307,7 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
 
     ``path`` leads to the part in its ``holder``. Laid over the part are the holder's settings
     ``ros``, of which the part has some of its own, ``settings``, and the ``variables`` that it is
-    given.
+    inputs.
     """
     key = holder.key_span(path)
     own = part.mapping("ros")

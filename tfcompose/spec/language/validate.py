@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Finding, RejectedError, without_duplicates
-from tfcompose.spec.language.args import Given, RosArguments
+from tfcompose.spec.language.args import BuildInputs, RosArguments
 from tfcompose.spec.language.conditions import unfold
 from tfcompose.spec.language.overlay import is_for_later
 from tfcompose.spec.language.preset import PresetSpec, wrong_names
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path, Source
 
 
-_NOTHING = Given()
+_NOTHING = BuildInputs()
 M = TypeVar("M", bound=Spec)
 
 
@@ -43,8 +43,8 @@ class Validated:
     refused: frozenset[Path] = frozenset()
     #: The paths of variables and arguments that nothing uses.
     unused: tuple[tuple[str, str], ...] = ()
-    given: Given = _NOTHING
-    #: The values of the arguments: ``given``, or their defaults.
+    inputs: BuildInputs = _NOTHING
+    #: The values of the arguments: those of ``inputs``, or their defaults.
     args: dict[str, ParameterValue] = field(default_factory=dict)
     #: The values of the environment variables that the file names.
     environment: dict[str, str] = field(default_factory=dict)
@@ -79,15 +79,15 @@ def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[
             yield ("links", child)
 
 
-def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Validated:
-    """Return the typed spec of a file with the ``given`` arguments.
+def validate(source: Source, aside: Any = None, inputs: BuildInputs = _NOTHING) -> Validated:
+    """Return the typed spec of a file, built with the ``inputs``.
 
     ``aside`` is data that is not merged now, such as other profiles, but may use its variables.
 
     Raises:
         RejectedError: if the robot's name or the version is missing.
     """
-    variables = Variables(source, given)
+    variables = Variables(source, inputs)
     idle = unused_variables(source.data, aside)
     done = unfold(source, variables)
     source = done.source
@@ -109,17 +109,17 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     entries = {_entry(path) for path in refused}
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
     from_outside = {
-        "args given": args,
+        "args inputs": args,
         "environment": variables.environment,
-        "ros arguments": asdict(given.ros) if given.ros != RosArguments() else {},
+        "ros arguments": asdict(inputs.ros) if inputs.ros != RosArguments() else {},
     }
     return Validated(
-        _with_ros_arguments(spec, given.ros),
+        _with_ros_arguments(spec, inputs.ros),
         source,
         findings,
         refused=refused,
         unused=idle,
-        given=given,
+        inputs=inputs,
         args=args,
         environment=variables.environment,
         conditions=done.conditions,

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from tfcompose.foundation.findings import Finding, Note, Span, did_you_mean, finding
 from tfcompose.foundation.units import NUMBER, Quantity, Truth, UnitError, format_value, quantity
-from tfcompose.spec.language.args import ArgError, ArgSpec, Given, GivenArg, full
+from tfcompose.spec.language.args import ArgError, ArgSpec, ArgValue, BuildInputs, full
 from tfcompose.spec.language.expressions import (
     A_FILE,
     IDENTIFIER,
@@ -127,10 +127,10 @@ class Variables:
     ``env`` names were, or what stood for them.
     """
 
-    def __init__(self, source: Source, given: Given) -> None:
+    def __init__(self, source: Source, inputs: BuildInputs) -> None:
         self.source = source
-        self.given = source.mapping("vars")
-        self.outside = given
+        self.declared = source.mapping("vars")
+        self.outside = inputs
         self.refusals: list[SpecRefusal] = []
         self.findings: list[Finding] = []
         self.uncomputed: list[Path] = []
@@ -167,7 +167,7 @@ class Variables:
         declared = self.source.mapping("args")
         for name, raw in declared.items():
             self.args[name] = self._arg(name, raw) if raw is not None else None
-        for name, given in self.outside.args.items():
+        for name, supplied in self.outside.args.items():
             if name not in declared:
                 there = (
                     f"its args are {', '.join(declared)}"
@@ -176,7 +176,7 @@ class Variables:
                 )
                 advice = did_you_mean(name, declared, there)
                 self.findings.append(
-                    finding("TF016", f"unknown argument {name}", given.span, help=advice)
+                    finding("TF016", f"unknown argument {name}", supplied.span, help=advice)
                 )
 
     def _arg(self, name: str, raw: Any) -> Value | None:
@@ -193,9 +193,9 @@ class Variables:
             spec = ArgSpec.model_validate(declared)
         except ValidationError:
             return None  # it is refused where the whole is read
-        given = self._given_arg(name, spec)
+        supplied = self._supplied_arg(name, spec)
         notes = [Note(f"args.{name} is declared here", self.source.key_span(path))]
-        if given is None and spec.default is None:
+        if supplied is None and spec.default is None:
             message, advice = (
                 f"the argument {name} has no value",
                 f"give {name}:=VALUE, or a default",
@@ -205,31 +205,35 @@ class Variables:
             )
             return None
         try:
-            return spec.value(spec.default if given is None else given.value)
+            return spec.value(spec.default if supplied is None else supplied.value)
         except ArgError as error:
-            if given:  # else its default is refused where the whole is read
+            if supplied:  # else its default is refused where the whole is read
                 self.findings.append(
                     finding(
-                        error.code, f"{name}: {error}", given.span, help=error.advice, notes=notes
+                        error.code,
+                        f"{name}: {error}",
+                        supplied.span,
+                        help=error.advice,
+                        notes=notes,
                     )
                 )
             return None
 
-    def _given_arg(self, name: str, spec: ArgSpec) -> GivenArg | None:
+    def _supplied_arg(self, name: str, spec: ArgSpec) -> ArgValue | None:
         if name in self.outside.args:
             return self.outside.args[name]
         value = self.outside.environment.get(spec.env) if spec.env else None
         if value is None:
             return None
         self.environment[str(spec.env)] = value
-        return GivenArg(value, Span(f"{spec.env}={value}"))
+        return ArgValue(value, Span(f"{spec.env}={value}"))
 
     def _read_all(self) -> None:
         """Compute every variable, first those that it needs.
 
         Without recursion, however long the chain.
         """
-        for first in self.given:
+        for first in self.declared:
             self.open = [first]
             waiting = [self._names_in(first)]
             while waiting:
@@ -250,18 +254,18 @@ class Variables:
                 self.open.pop()
 
     def _names_in(self, name: str) -> Iterator[str]:
-        value = self.given[name]
+        value = self.declared[name]
         names = names_in(value) if isinstance(value, str) else []
-        return iter([other for other in names if other in self.given])
+        return iter([other for other in names if other in self.declared])
 
     def _read(self, name: str) -> None:
         if name in self.known:
             return
-        if self.given[name] is None:  # a null is refused as such
+        if self.declared[name] is None:  # a null is refused as such
             self.known[name] = None
             return
         try:
-            self.known[name] = self._value(name, self.given[name])
+            self.known[name] = self._value(name, self.declared[name])
         except ExpressionError as error:
             self.known[name] = None
             self._refuse(error, ("vars", name))
@@ -323,8 +327,8 @@ class Variables:
             raise ExpressionError(f"{name} is {RESERVED[name]}", A_FILE)
         if name == "math.pi":
             raise ExpressionError(f"unknown variable {name}", "write pi")
-        there = f"vars has {', '.join(self.given)}" if self.given else "the file has no vars"
-        raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.given, there))
+        there = f"vars has {', '.join(self.declared)}" if self.declared else "the file has no vars"
+        raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.declared, there))
 
     def _lookup_arg(self, name: str) -> Value:
         if name in self.args:
@@ -349,7 +353,7 @@ class Variables:
         self.environment[name] = value
         return EnvironmentText(value)
 
-    def _value(self, name: str, given: Any) -> Value:
+    def _value(self, name: str, raw: Any) -> Value:
         if name in RESERVED:
             raise ExpressionError(f"{name} is {RESERVED[name]}", "give the variable another name")
         if not IDENTIFIER.fullmatch(name):
@@ -357,13 +361,13 @@ class Variables:
                 f"{name!r} cannot name a variable",
                 "a letter or _, then letters, digits and _: for example mast_height",
             )
-        if isinstance(given, bool) or not isinstance(given, (int, float, str)):
+        if isinstance(raw, bool) or not isinstance(raw, (int, float, str)):
             raise ExpressionError(
-                f"the variable {name} is {format_value(given)}", "a number, a quantity or a string"
+                f"the variable {name} is {format_value(raw)}", "a number, a quantity or a string"
             )
-        if not isinstance(given, str):
-            return Quantity(given)
-        value = fill(given, self.lookup) if "${" in given else given
+        if not isinstance(raw, str):
+            return Quantity(raw)
+        value = fill(raw, self.lookup) if "${" in raw else raw
         if not isinstance(value, str):
             return value
         try:

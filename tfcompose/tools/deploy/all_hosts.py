@@ -68,7 +68,7 @@ def _plan(arguments: Namespace) -> Plan:
     plan, _ = expected_plan(
         file,
         Namespace(
-            file=file, profiles=[], overlays=[], settings=[], given={}, trust=arguments.trust
+            file=file, profiles=[], overlays=[], settings=[], arg_values={}, trust=arguments.trust
         ),
     )
     try:

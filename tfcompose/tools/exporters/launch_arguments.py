@@ -20,7 +20,14 @@ from tfcompose.compiler.emit import emit
 from tfcompose.foundation.findings import Span
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import OWN_KINDS
-from tfcompose.spec.language import Given, GivenArg, compose, profiles_in, validate, with_includes
+from tfcompose.spec.language import (
+    ArgValue,
+    BuildInputs,
+    compose,
+    profiles_in,
+    validate,
+    with_includes,
+)
 from tfcompose.spec.language.args import as_given
 from tfcompose.spec.language.argument_uses import HOLE, names_of, uses_of
 from tfcompose.spec.language.arguments import values_that_satisfy
@@ -102,7 +109,9 @@ def collect_launch_values(
         if spec.default is not None
     }
     defaults |= {
-        name: values[name] for name in values if name in arguments.given or name not in defaults
+        name: values[name]
+        for name in values
+        if name in arguments.arg_values or name not in defaults
     }
     declared = tuple(
         _argument(name, spec, defaults[name]) for name, spec in specs.items() if name in used
@@ -228,7 +237,7 @@ class _Combinations:
     def _compile(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
         arguments = self.arguments
         args = {
-            name: GivenArg(value, Span(f"{name}:={value}"))
+            name: ArgValue(value, Span(f"{name}:={value}"))
             for name, value in (self.values | values).items()
         }
         compiled: Compiled = compile_robot(
@@ -239,7 +248,7 @@ class _Combinations:
             overlays=overlays_of(arguments),
             read=read_text,
             disk=disk_of(arguments.file, arguments),
-            given=Given(args, os.environ),
+            inputs=BuildInputs(args, os.environ),
         )
         if compiled.robot is None or compiled.errors:
             return None

@@ -57,7 +57,7 @@ def arguments(parser: ArgumentParser) -> None:
         "more", nargs="*", metavar="FILE", help="more calibration files of Autoware"
     )
     parser.add_argument(
-        "given",
+        "arg_values",
         nargs="*",
         default=[],
         metavar="NAME:=VALUE",
@@ -132,7 +132,7 @@ def _import_urdf(arguments: Namespace) -> int:
     _refuse_more(arguments)
     packages = pairs(arguments.packages, "=")
     known = _known_packages(packages, arguments)
-    document = read_urdf(arguments.file, known, arguments.given)
+    document = read_urdf(arguments.file, known, arguments.arg_values)
     errors = [finding for finding in document.findings() if finding.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
@@ -193,9 +193,9 @@ def _refuse_more(arguments: Namespace) -> None:
 
 
 def _refuse_given(arguments: Namespace) -> None:
-    if arguments.given:
+    if arguments.arg_values:
         fail(
-            f"{next(iter(arguments.given))}:=…: only xacro and launch files take arguments",
+            f"{next(iter(arguments.arg_values))}:=…: only xacro and launch files take arguments",
             UNREADABLE,
         )
 
@@ -228,7 +228,7 @@ def _add_vehicles(draft: ImportDraft, arguments: Namespace) -> None:
     from tfcompose.tools.importers.kits import add_vehicles
 
     _refuse_more(arguments)
-    for name in arguments.given.keys() - {"vehicle_id", "sensor_model"}:
+    for name in arguments.arg_values.keys() - {"vehicle_id", "sensor_model"}:
         fail(
             f"{name}:=…: a folder of Autoware's individual_params takes vehicle_id and"
             " sensor_model",
@@ -239,7 +239,7 @@ def _add_vehicles(draft: ImportDraft, arguments: Namespace) -> None:
         draft,
         folder,
         _target(arguments),
-        arguments.given,
+        arguments.arg_values,
         lambda file: load(read_text(file), file),
     )
 
@@ -321,7 +321,7 @@ def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: 
     launch = Launch(
         file,
         read_text(file),
-        arguments.given,
+        arguments.arg_values,
         packages,
         prefixes=prefixes,
         every_branch=arguments.all_branches,

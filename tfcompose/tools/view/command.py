@@ -219,7 +219,7 @@ def _running_plan(arguments: Namespace) -> str | None:
         or arguments.profiles
         or arguments.overlays
         or arguments.settings
-        or arguments.given
+        or arguments.arg_values
     ):
         return None
     from tfcompose.cli.runs import plan_file, run_of_domain

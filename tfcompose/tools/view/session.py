@@ -111,7 +111,7 @@ class Session:
         """
         robot, source = self.robot, self.state.sources[0]
         mount = mount_of(robot, source, child)
-        if mount.edge.sensor and not mount.edge.given and not mount.data:
+        if mount.edge.sensor and not mount.edge.declared and not mount.data:
             holder = next(
                 (sensor.mount for sensor in robot.sensors if sensor.name == mount.edge.sensor),
                 child,

@@ -62,7 +62,7 @@ def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sess
             overlays=overlays,
             read=read,
             disk=packages,
-            given=inputs_of(arguments),
+            inputs=inputs_of(arguments),
         )
 
     def write(name: str, old: str, new: str) -> None:

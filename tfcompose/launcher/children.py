@@ -134,8 +134,14 @@ class Children:
         return Started(process.name, child.popen.pid)
 
     def prepare(self, process: PlanProcess, command: ChildCommand) -> None:
-        """Let one of tfcompose's own processes join ROS; it publishes once it is started."""
-        theirs, ours = os.pipe()
+        """Let one of tfcompose's own processes join ROS; it publishes once it is started.
+
+        If that fails, its start says why.
+        """
+        try:
+            theirs, ours = os.pipe()
+        except OSError:
+            return
         try:
             self._spawn(
                 process,
@@ -145,7 +151,7 @@ class Children:
             )
             self._held[process.name] = ours
         except (OSError, subprocess.SubprocessError, ValueError):
-            os.close(ours)  # its start will say why
+            os.close(ours)
         finally:
             os.close(theirs)
 
@@ -369,22 +375,33 @@ class GuardPipes:
     """
 
     def __init__(self, *, joins: bool, memory: dict[str, Any]) -> None:
-        read_fd, write_fd = os.pipe()
-        orders_fd, self._orders = os.pipe()
-        os.set_blocking(self._orders, False)
-        self.theirs: tuple[int, ...] = (write_fd, orders_fd)
-        self.events = io.FileIO(read_fd)
-        self.env = {EVENTS_FD: str(write_fd), ORDERS_FD: str(orders_fd)} | (
-            {JOINS: "1"} if joins else {}
-        )
+        """Open the pipes.
 
-        if memory:
-            memory_fd = os.memfd_create("tfcompose-guard-memory")
-            with open(memory_fd, "wb", closefd=False) as file:
-                file.write(msgspec.json.encode(memory))
-            os.lseek(memory_fd, 0, os.SEEK_SET)
-            self.theirs += (memory_fd,)
-            self.env[MEMORY_FD] = str(memory_fd)
+        Raises:
+            OSError: if they cannot be opened.
+        """
+        with contextlib.ExitStack() as opened:
+
+            def kept(fd: int) -> int:
+                opened.callback(os.close, fd)
+                return fd
+
+            read_fd, write_fd = map(kept, os.pipe())
+            orders_fd, self._orders = map(kept, os.pipe())
+            os.set_blocking(self._orders, False)
+            self.theirs: tuple[int, ...] = (write_fd, orders_fd)
+            self.env = {EVENTS_FD: str(write_fd), ORDERS_FD: str(orders_fd)} | (
+                {JOINS: "1"} if joins else {}
+            )
+            if memory:
+                memory_fd = kept(os.memfd_create("tfcompose-guard-memory"))
+                with open(memory_fd, "wb", closefd=False) as file:
+                    file.write(msgspec.json.encode(memory))
+                os.lseek(memory_fd, 0, os.SEEK_SET)
+                self.theirs += (memory_fd,)
+                self.env[MEMORY_FD] = str(memory_fd)
+            self.events = io.FileIO(read_fd)
+            opened.pop_all()
 
     def close_guard_ends(self) -> None:
         """Close the guard's ends."""

@@ -158,27 +158,27 @@ def test_the_digest_of_the_plan_changes_with_the_file() -> None:
 
 
 @pytest.mark.parametrize(
-    ("params", "file", "code", "message"),
+    ("params", "file", "code", "name"),
     [
         ("{file: none.yaml}", "", "TF001", "no such file"),
         ("{file: [3]}", "", "TF103", "names of files"),
         ("{file: q.yaml}", "[1, 2]", "TF002", "mapping of nodes"),
         ("{file: q.yaml}", "a: {b: [}", "TF002", ""),
-        ("{file: q.yaml}", "a: 3", "TF018", "no node"),
+        ("{file: q.yaml}", "a: 3", "TF018", ""),
         ("{file: q.yaml}", "planer: {ros__parameters: {a: 1}}", "TF334", "/robot1/planner"),
-        ("{file: q.yaml}", "x: &x [1]\n" * 1, "TF018", "no node"),
+        ("{file: q.yaml}", "x: &x [1]\n" * 1, "TF018", ""),
         ("{planner: {ros__parameters: {a: 1}}}", "", "TF334", "planner"),
         ("{ros__parameters: {a: 1}}", "", "TF334", "ros__parameters"),
     ],
 )
 def test_what_is_no_parameter_of_the_node_is_a_finding(
-    params: str, file: str, code: str, message: str
+    params: str, file: str, code: str, name: str
 ) -> None:
     findings = compiled(params, q=file).findings
     assert [finding.code for finding in findings] == [code], [
         finding.message for finding in findings
     ]
-    assert message in findings[0].message
+    assert name in findings[0].message
 
 
 def test_of_several_files_one_need_not_name_the_node_but_none_is_a_warning_for_each() -> None:

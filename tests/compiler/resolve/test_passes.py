@@ -32,6 +32,7 @@ READ_A_FILE = {
     "tools/importers/adopt.py",
     "tools/importers/command.py",
     "tools/importers/kits.py",
+    "tools/ros2/frontend.py",
 }
 
 

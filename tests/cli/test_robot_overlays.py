@@ -103,6 +103,14 @@ def test_a_robot_without_an_overlay_is_a_finding(
     assert not (folder / "out").exists()
 
 
+def test_a_missing_folder_is_a_finding(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Otherwise each robot would start with the nominal mounts."""
+    (folder / "robot.yaml").write_text(ROBOT.replace("units", "unit"), "utf-8")
+    assert codes(capsys) == [("TF023", "robot.yaml", 5)]
+    assert main(["up", "--dry-run"]) == 1
+    assert main(["build", "-o", "out"]) == 0
+
+
 def test_a_robot_file_without_overlays_refuses_robot(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -119,7 +127,7 @@ def test_untrusted_lint_lists_no_folder_outside_of_the_tree(
     (inner / "robot.yaml").write_text(ROBOT.replace("units", "../units"), "utf-8")
     (folder / "units/cat.yaml").write_text("frames: {mast: {parent: base_lnk}}\n", "utf-8")
     assert codes(capsys, "inner/robot.yaml") != []
-    assert codes(capsys, "--untrusted", "inner/robot.yaml") == []
+    assert codes(capsys, "--untrusted", "inner/robot.yaml") == [("TF023", "inner/robot.yaml", 5)]
 
 
 def test_a_built_plan_takes_no_robot(folder: Path) -> None:

@@ -36,7 +36,7 @@ from tfcompose.spec.language import (
     BuildInputs,
     find_overlay,
     load_robot_overlay,
-    overlay_folder,
+    overlay_files,
     robots_with_overlay,
     set_value,
     with_includes,
@@ -161,17 +161,15 @@ def _robot_overlay(arguments: Namespace, source: Source) -> str | None:
     """Return the overlay of --robot, or of this computer for a command that starts robots.
 
     Raises:
-        RejectedError: if the named robot has none.
+        RejectedError: if the named robot has none, or the folder is missing.
     """
-    folder = overlay_folder(source)
-    files = names_in(folder) if folder and is_folder(folder) else []
-    robot = getattr(arguments, "overlay_robot", None)
-    if robot is not None:
-        return find_overlay(source, robot, files)
-    here = os.uname().nodename
-    if getattr(arguments, "by_hostname", False) and here in robots_with_overlay(files):
-        return find_overlay(source, here, files)
-    return None
+    robot, here = getattr(arguments, "overlay_robot", None), os.uname().nodename
+    if robot is None and not getattr(arguments, "by_hostname", False):
+        return None
+    files = overlay_files(source, lambda folder: names_in(folder) if is_folder(folder) else None)
+    if robot is None and here not in robots_with_overlay(files):
+        return None
+    return find_overlay(source, here if robot is None else robot, files)
 
 
 def disk_of(file: str, arguments: Namespace) -> Disk:

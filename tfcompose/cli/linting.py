@@ -163,13 +163,19 @@ class _Variants:
         Also unused allow comments.
         """
         from tfcompose.compiler.check import unused_allows
+        from tfcompose.foundation.findings import RejectedError
+        from tfcompose.spec.language import overlay_files
 
         known = {_identity(finding) for finding in findings}
         # A profile that lays over another key of an entry moves the place of what was found there.
         messages = {_judgement(finding) for finding in findings} - {None}
         more: list[Finding] = []
         variants = list(judged)
-        for option, variant in self._each_variant():
+        try:
+            files = overlay_files(self.source, self._names_in)
+        except RejectedError as error:
+            files, more = [], list(error.findings)
+        for option, variant in self._each_variant(files):
             variants.append(variant)
             note = Note(f"with {option}")
             new = [
@@ -186,14 +192,16 @@ class _Variants:
             more += unused_allows(self.source.allows, used)
         return more
 
-    def _each_variant(self) -> Iterator[tuple[str, Compiled]]:
-        """Yield the robot with each profile, then with each robot's overlay, by its option."""
+    def _each_variant(self, files: Sequence[str]) -> Iterator[tuple[str, Compiled]]:
+        """Yield the robot with each profile, then with each robot's overlay, by its option.
+
+        ``files`` are the names in the folder of the overlays.
+        """
         from tfcompose.compiler.compile import Compiled
         from tfcompose.foundation.findings import RejectedError
         from tfcompose.spec.language import (
             find_overlay,
             load_robot_overlay,
-            overlay_folder,
             profiles_in,
             robots_with_overlay,
         )
@@ -201,8 +209,6 @@ class _Variants:
         for profile, inside in profiles_in(self.source).items():
             if "when" not in inside or not self.source.has(("args",)):
                 yield f"--profile {profile}", self._compile(self.inputs, [profile])
-        folder = overlay_folder(self.source)
-        files = names_in(folder) if folder and self.files.is_folder(folder) else []
         for robot in robots_with_overlay(files):
             path = find_overlay(self.source, robot, files)
             try:
@@ -211,6 +217,9 @@ class _Variants:
                 yield f"--robot {robot}", Compiled(None, error.findings)
             else:
                 yield f"--robot {robot}", self._compile(self.inputs, [], overlays)
+
+    def _names_in(self, folder: str) -> list[str] | None:
+        return names_in(folder) if self.files.is_folder(folder) else None
 
     def _compile(
         self, inputs: BuildInputs, profiles: Sequence[str], more: Sequence[Source] = ()

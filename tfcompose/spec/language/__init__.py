@@ -20,7 +20,7 @@ from tfcompose.spec.language.recognition import is_recognized, load_named
 from tfcompose.spec.language.robot_overlays import (
     find_overlay,
     load_robot_overlay,
-    overlay_folder,
+    overlay_files,
     robots_with_overlay,
 )
 from tfcompose.spec.language.validate import (
@@ -46,7 +46,7 @@ __all__ = [
     "levels_of",
     "load_named",
     "load_robot_overlay",
-    "overlay_folder",
+    "overlay_files",
     "profiles_in",
     "robots_with_overlay",
     "set_value",

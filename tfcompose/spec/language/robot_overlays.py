@@ -30,6 +30,25 @@ def overlay_folder(source: Source) -> str | None:
     return find_path(folder, source.span_of(("overlays", "folder")))
 
 
+def overlay_files(source: Source, list_folder: Callable[[str], Iterable[str] | None]) -> list[str]:
+    """Return the names of the files in the folder of the overlays; none if there are no overlays.
+
+    ``list_folder`` returns the names in a folder, None if there is no such folder.
+
+    Raises:
+        RejectedError: if the folder is missing.
+    """
+    folder = overlay_folder(source)
+    if folder is None:
+        return []
+    names = list_folder(folder)
+    if names is None:
+        message = f"there is no folder {folder} for the overlays of single robots"
+        span = source.span_of(("overlays", "folder"))
+        raise RejectedError([finding("TF023", message, span, help="make it, or correct folder:")])
+    return list(names)
+
+
 def robots_with_overlay(files: Iterable[str]) -> list[str]:
     """Return the robots whose overlays are among a folder's files, sorted."""
     stems = (file.removesuffix(ENDING) for file in files if file.endswith(ENDING))

@@ -36,7 +36,11 @@ class Parser(ArgumentParser):
     """Parser that suggests the nearest option and names the help."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the error and exit with 2."""
+        """Print the error and end the command.
+
+        Raises:
+            SystemExit: with 2.
+        """
         import difflib
 
         advice = f"{self.prog} --help lists the options"

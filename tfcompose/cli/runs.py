@@ -137,7 +137,11 @@ def request(runtime_dir: RuntimeDir, question: Request, answer: type[A]) -> A | 
 
 
 def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
-    """Have the launcher apply the verb to each named process; return the exit code."""
+    """Have the launcher apply the verb to each named process; return the exit code.
+
+    Raises:
+        SystemExit: if a robot file is named instead of processes, or no robot is chosen.
+    """
     files = [name for name in arguments.name if name.endswith((".yaml", ".yml"))]
     if files:
         advice = "down stops a robot" if verb == "stop" else f"up {files[0]} starts a robot"

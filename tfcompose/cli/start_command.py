@@ -118,6 +118,9 @@ def build_and_start(arguments: Namespace) -> int:
     """Start the plan and return the exit code.
 
     0 after a clean end, 1 after a failure or a finding, 2 unreadable.
+
+    Raises:
+        SystemExit: after the reason why nothing can be built or started.
     """
     from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
 

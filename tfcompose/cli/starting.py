@@ -107,6 +107,9 @@ def start(
 
     ``forker`` has loaded the modules of tfcompose's own processes. ``built_with`` are the warnings
     of the plan's build, which were printed. ``events`` receives each notice.
+
+    Raises:
+        SystemExit: after the reason why the plan cannot be started.
     """
     plan = plan_to_start(read_built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:

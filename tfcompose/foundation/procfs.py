@@ -46,7 +46,11 @@ def pids() -> list[int]:
 
 
 def stat(pid: int | str) -> Stat:
-    """Return the process's state, parent, group and times."""
+    """Return the process's state, parent, group and times.
+
+    Raises:
+        OSError: if the process has ended.
+    """
     fields = _read(pid, "stat").rpartition(b")")[2].split()
     if not fields:
         raise ProcessLookupError(f"process {pid} has ended")

@@ -38,7 +38,7 @@ class JointWatch:
         self._joints = planned_joints(plan)
         self._emit = emit
         self._due = 0.0
-        #: What is reported and not over, by code and message.
+        #: Reported faults that are not over, by code and message.
         self._wrong: dict[tuple[str, str], Finding] = {}
 
     def wrong(self) -> list[Finding]:

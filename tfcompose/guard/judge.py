@@ -159,7 +159,7 @@ class Judge:
         self._senders.update(publishers)
         events = [*self._recheck(now), *self._publishers.wrong_settings(publishers)]
         for report in self._publishers.leaving_the_fence(publishers, self._senders, now):
-            # What it has sent is reported first: it can be stopped for this before that is due.
+            # Report its messages first: it may be stopped before their own report is due.
             events += self.ledger.report(now, at_once=report.gid)
             events += self._publishers.report_unfenced(report, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
@@ -246,7 +246,7 @@ class Judge:
             self.live.absent(owner)
         self.ledger.forget_owners(edges)
 
-    # What the next guard must know.
+    # State for the next guard.
 
     @property
     def mark(self) -> tuple[int, ...]:
@@ -278,7 +278,7 @@ class Judge:
         self.live.recall(memory.live, now, self._finds_until)
         return [Clear()]
 
-    # What is seen.
+    # Observations.
 
     def _recheck(self, now: float) -> list[GuardEvent]:
         """Judge messages that waited for a node name."""

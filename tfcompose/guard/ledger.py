@@ -132,7 +132,7 @@ class Ledger:
         self._waiting: dict[SentEdge, float] = {}
         self._pace: Pace[tuple[Group, bool]] = Pace()
         self._ended: dict[Group, list[tuple[Fault, bool]]] = {}
-        #: Where publishers ran that have ended, by edges that others of the group go on with.
+        #: Locations of ended publishers, by edges that others of the group still publish.
         self._left: dict[Group, dict[Ends, list[str]]] = {}
         self._know_processes(plan)
 
@@ -190,8 +190,7 @@ class Ledger:
                     continue
             sent = SentEdge(message.gid, parent, child, message.static)
             fault = self._fault(sent, nodes, now) if nodes else None
-            # Where ids do not say whose they are, the sender may be one that the graph does not
-            # show yet.
+            # If ids do not identify nodes, the sender may be one that the graph does not show yet.
             if not nodes or (fault and not sure and not fault.namesake):
                 self._waiting.setdefault(sent, now)
                 certain = False
@@ -207,7 +206,7 @@ class Ledger:
         judged.entries, judged.children = tuple(entries), tuple(children)
         if left < 0 and message.gid not in self.flooders:  # its messages count from now on
             self.count_flood(message.gid, len(message.edges), now)
-        # Of a flood the edges change what is known, and are not judged anew for it.
+        # The edges of a flood change the state, but do not cause another judgement.
         epoch = self.epoch if left < 0 else epoch
         judged.epoch = epoch if certain and epoch == self.epoch else -1
         judged.until = now + UNDECLARED_S if unplanned else float("inf")

@@ -225,7 +225,7 @@ class Liveness:
         self._complete = False
         self._gone: set[str] = set()
         self._absent: set[str] = set()
-        #: What is reported and not over, by the edge's child: silence, a low rate.
+        #: Reported faults that are not over, by the edge's child: silence, a low rate.
         self._wrong: dict[str, WrongEdges] = {}
         self._watched = WatchedTime()
 

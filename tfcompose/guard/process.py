@@ -183,7 +183,7 @@ class TopicWatch:
         declared = self._flood.read(now)  # after the others, which wait for nothing
         if declared is not None:
             self._judge(self._read(declared, now), now)
-        # What is under way waits for a check no longer than it must.
+        # Delay messages in transit by a check as little as possible.
         if now >= self._due + (LATE_S if fenced else 0.0):
             self._due = self.judge.next_tick(now, CHECK_EVERY_S)
             if not strangers:  # else it was asked for them
@@ -462,7 +462,8 @@ def _watches(
     says_who = ids_say_who(node)
     watches = []
     for topics, plan in plans.items():
-        # One that judges nobody, or joins, takes every owner as the plan's, whenever it began.
+        # A guard that joins, or does not judge, accepts every owner as the plan's, even if it
+        # began earlier.
         begun_ns = 0 if joins or not judges else time.time_ns()
         judge = Judge(
             plan, settle_s, now, begun_ns, says_who=says_who, remapped=private is not None

@@ -47,8 +47,7 @@ def command_of(argv: Sequence[str], base: Mapping[str, str]) -> ChildCommand | i
         return _fail(
             f"{name} is a component, which the guard has {process.component.container} load", 2
         )
-    # What is sent in a partition is known to be ours by the launcher's run; topics of each
-    # process's own need none.
+    # The launcher's run identifies messages in a partition; a topic per process needs no run.
     plan = replace(plan, guard=replace(plan.guard, fence="remap"))
     commands, findings = commands_of(plan, [process], file, base, child_environment)
     if findings:

@@ -112,7 +112,7 @@ def _cpus_with(schedule: Schedule) -> set[int]:
     return os.sched_getaffinity(0)
 
 
-# Who ends first when memory runs out.
+# Order of killing when memory runs out.
 
 _SCORE = Path(OOM_SCORE)
 
@@ -136,7 +136,7 @@ def _score_refusal(name: str, score: int) -> Finding | None:
     return None
 
 
-# How many files are open.
+# Limit of open files.
 
 
 def _apply_open_files(count: int) -> None:

@@ -114,7 +114,7 @@ def wake_time(state: State) -> float | None:
     return min(due, default=None)
 
 
-# What happened.
+# Events.
 
 
 def _react(step: Transition, event: Event) -> None:
@@ -204,7 +204,7 @@ def _introduce(step: Transition, owner: Tracked) -> None:
         step.actions += [Order(Absent(name)), Order(Present(name))]
 
 
-# What the guard reports.
+# Reports of the guard.
 
 
 def _take_guard_report(step: Transition, event: Event) -> None:
@@ -358,7 +358,7 @@ def _kill_a_guard_that_hangs(step: Transition) -> None:
     _expect_no_sign_of_life(step)
 
 
-# What follows.
+# Consequences.
 
 
 def _settle(step: Transition) -> None:

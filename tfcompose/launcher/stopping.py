@@ -86,7 +86,7 @@ def _take_end(step: Transition, event: Exited) -> None:
         _restart_after(step, tracked, event)
         return
     step.enter(name, "exited", how)
-    # What others wait for has come, and does not go with the process.
+    # The condition that other processes wait for is met, and outlives the process.
     if done and ((before.ready and not process.owns) or (ready and ready.kind == "exit")):
         step.track(
             name,
@@ -334,7 +334,7 @@ def _take_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked
     return Tracked(process, rests, order=tracked.order)
 
 
-# What requests that everything stops.
+# Requests to stop everything.
 
 
 def stop_if_requested(step: Transition, event: Event) -> None:

@@ -73,7 +73,11 @@ class Bodies:
         return visuals, collisions, inertial
 
     def shape(self, shape: specs.ShapeSpec, path: Path) -> Shape:
-        """Return the shape, which must have a form."""
+        """Return the shape.
+
+        Raises:
+            ValueError: if it has no form.
+        """
         material = None
         if shape.material:
             material = self._material(shape.material, (*path, "material"))

@@ -57,7 +57,7 @@ class Draft:
     collected: Collected
     #: The robot that includes this one as a part.
     holder: Draft | None = None
-    #: Where its files find packages.
+    #: Search paths of packages for its files.
     packages: Packages = field(init=False)
     #: The entries (section, name) that were refused, and names that parts would have brought.
     broken: set[tuple[str, str]] = field(init=False)

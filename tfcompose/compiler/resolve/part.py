@@ -116,9 +116,12 @@ class PartEntry:
         return source
 
     def join(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
-        """Return the part under the names that it has in the holder.
+        """Return the part with its names in the robot that contains it.
 
-        ``implied`` are frames that only the holder defines.
+        ``implied`` are frames that only the containing robot defines.
+
+        Raises:
+            RejectedError: if the prefix is invalid, or the root frame is unknown.
         """
         if not _PREFIX.fullmatch(self.prefix):
             span, advice = (

@@ -237,7 +237,7 @@ def _edge(element: Element, values: AttributeReader) -> Edge | None:
     if kind and kind not in JOINT_TYPES:
         advice = did_you_mean(kind, JOINT_TYPES, f"one of: {', '.join(JOINT_TYPES)}")
         values.refuse(f"unknown joint type {kind}", element.value_span("type"), advice)
-        # What follows from it is judged as if it were right.
+        # Later checks treat it as valid.
         kind = nearest(kind, JOINT_TYPES) or kind
     ends = {}
     for tag in ("parent", "child"):

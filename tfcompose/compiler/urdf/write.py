@@ -94,6 +94,9 @@ class UrdfWriter:
         A frame of unknown pose is omitted with the frames below it, and a comment says so. For a
         stock publisher the root has no inertia: KDL, which that node uses to read URDF, supports
         none there and warns at each start.
+
+        Raises:
+            ValueError: if the robot has no base.
         """
         if robot.base is None:
             raise ValueError(f"{robot.name} has no base")

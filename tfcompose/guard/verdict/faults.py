@@ -288,7 +288,7 @@ _SENTENCES: Mapping[str, Callable[[FaultGroup], tuple[str, str]]] = {
 }
 
 
-# Whatever is wrong with each edge: before the start, and of another robot.
+# Findings about edges before the start, and about another robot.
 
 
 def taken_finding(group: FaultGroup) -> Finding:
@@ -333,7 +333,7 @@ def other_robot_finding(faults: Sequence[Fault], run: OtherRun, plan: Plan) -> F
     return finding("TF854", message, None, notes=notes, help=advice, severity=severity)
 
 
-# What to do.
+# Advice.
 
 
 def _leave_out_help(group: FaultGroup) -> str:

@@ -33,7 +33,7 @@ _SAME = Offset(1e-6, 2e-5)
 TOGETHER_S = 0.3
 
 
-# What there is to say.
+# Findings.
 
 
 def two_publishers_message(edges: str, publishers: Sequence[str], *, are_many: bool) -> str:

@@ -58,7 +58,7 @@ SPEED_OVER_S = 2.0
 STANDS_S = 0.3
 
 
-# What there is to say.
+# Findings.
 
 
 def other_clock(stamp_ns: int, received_ns: int, sim_ns: int | None, *, simulated: bool) -> str:
@@ -230,8 +230,8 @@ class StampHistory:
         last, self.last = self.last, stamps_ns
         off = self._clock(stamps_ns, received_ns, clocks)
         step = self._step(stamps_ns, last) if last else ("", "")
-        # Who repeats a stamp for long is off at last, and that follows from it; who has none is
-        # said to have none.
+        # A repeated stamp drifts from the clock in time: report only the repetition. A missing
+        # stamp is reported as missing.
         if off and (step[0] != REPEATED or not stamps_ns[0]):
             return WRONG_CLOCK, off
         return step

@@ -30,7 +30,7 @@ _NORMALISE = (
 )
 
 
-# What there is to say.
+# Findings.
 
 
 def way(frames: Sequence[str]) -> str:

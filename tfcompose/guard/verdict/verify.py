@@ -76,7 +76,7 @@ class Difference:
     fault: Fault | None = None
     #: The preset's frame whose pose the driver sends differently.
     driver: Expected | None = None
-    #: Deviation of the pose, whoever sent it.
+    #: Deviation of the pose, regardless of its sender.
     off: Offset | None = None
     #: Time without a message, in seconds.
     silence_s: float = 0.0
@@ -320,7 +320,7 @@ def group_finding(
         if first.fault
         else _difference_finding(group, state, plan, span, slow_is)
     )
-    # Of a recording nobody can mend what its nodes did.
+    # Advice on running nodes is useless for a recording.
     return (
         replace(finding, help="")
         if state.recorded and first.code in {"TF804", "TF805", "TF846"}

@@ -193,7 +193,11 @@ class DocumentReader:
             self._put(value, location, 1, 0)
 
     def value_of(self, event: yaml.ScalarEvent, location: Location) -> Any:
-        """Return a scalar's value, and note what is wrong with it."""
+        """Return a scalar's value, and record its faults.
+
+        Raises:
+            RejectedError: if it has a character that no text can hold.
+        """
         tag, text = event.tag, event.value
         try:
             if event.implicit[0] and (tag is None or tag == "!"):

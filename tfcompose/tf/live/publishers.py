@@ -138,7 +138,7 @@ class Publisher:
     where: str = ""
     #: Whether its process belongs to the guard's own run; None: unknown.
     ours: bool | None = None
-    #: Whether a strict plan's isolation applies to it; None: there is none.
+    #: Whether a strict plan's isolation applies to it; None: the plan has none.
     fenced: bool | None = None
     #: Further nodes that it may belong to.
     others: tuple[str, ...] = ()

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.node import MessageSource, Received
 
     Topics = tuple[str, str]
-    #: How processes are fenced off: by a partition, or by topics of each one's own; empty: they
-    #: are not.
+    #: Fence around processes: a partition, or separate topics for each; empty: none.
     Fence = Literal["", "partition"] | Mapping[str, Topics]
 
 _ID_BYTES = 16
@@ -80,8 +79,7 @@ class TFTopics:
             for process, pair in private.items()
             for static in (True, False)
         ]
-        # What everybody sends has a port of its own, so that a flood there throws out nothing of
-        # what is fenced off.
+        # Public messages have their own port, so that a flood of them displaces no fenced message.
         apart = bool(fence) and middleware().startswith("rmw_fastrtps")
         self._public = []
         for static in (True, False):
@@ -252,7 +250,7 @@ class TFGraph:
         #: Those who were heard outside of the fence's partition.
         self._public: dict[bytes, None] = {}
         self._changes = graph_changes(node)
-        #: What the graph showed on one's own and on the global topics, at which of its changes.
+        #: Content of the graph on the robot's own and on the global topics, with its change count.
         self._shown: _Shown | None = None
         self._shown_globally: _Shown | None = None
 

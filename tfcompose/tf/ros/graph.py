@@ -325,7 +325,7 @@ def _by_tokens(rmw: str) -> bool:
         or find_spec("xxhash") is None
     ):
         return False
-    # What only robots on Zenoh need.
+    # Only for robots on Zenoh.
     from tfcompose.tf.ros.zenoh_graph import RobotGraph  # noqa: PLC0415
 
     try:

@@ -428,7 +428,7 @@ class PublicTFReader(MessageSource):
         taken, info = ctypes.byref(self._taken), ctypes.byref(self._info)
         self._arguments = (self._reader, ctypes.byref(self._bytes), taken, info, None)
         self._came = _rclpy.GuardCondition(node.context.handle)
-        # Whatever thread of DDS's the message came in calls rcl's function itself, without Python.
+        # The DDS thread that received the message calls rcl's function directly, without Python.
         trigger = ctypes.cast(library.rcl_trigger_guard_condition, ctypes.c_void_p)
         condition = ctypes.c_void_p(self._came.pointer)
         if (

@@ -30,7 +30,7 @@ class LookupAction:
                 "a buffer server is asked with tf2_msgs, which a ROS distribution has and PyPI"
                 " has not"
             )
-        # There is none with the wheels from PyPI.
+        # The wheels from PyPI lack it.
         from tf2_msgs.action import LookupTransform  # noqa: PLC0415
 
         self._type = LookupTransform

@@ -327,7 +327,7 @@ class Decoder:
     def __init__(self) -> None:
         self._layouts: dict[tuple[int, bytes, bytes], list[MessageLayout]] = {}
         self._bytes = 0
-        #: How many messages were laid out like none before.
+        #: Number of messages with a new layout.
         self.read_anew = 0
 
     def knows(self, data: bytes) -> bool:

@@ -207,7 +207,7 @@ def tf_message_type() -> Any:
         RosError: if tf2_msgs is not installed and this ROS does not match our own type support.
     """
     if find_spec("tf2_msgs") is not None:
-        # There is none with the wheels from PyPI.
+        # The wheels from PyPI lack it.
         from tf2_msgs.msg import TFMessage  # noqa: PLC0415
 
         load_type_support: Any = check_for_type_support  # rclpy does not say its types
@@ -384,7 +384,7 @@ def _bytes_class(type_: str, attributes: dict[str, Any]) -> Any:
     return meta(name, (), {"__doc__": f"{type_}, as bytes only.", "__module__": __name__})
 
 
-# What can be read out of rosidl's structures.
+# Reading rosidl's structures.
 
 
 def type_hash(description: dict[str, Any]) -> str:

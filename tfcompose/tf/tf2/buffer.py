@@ -111,7 +111,11 @@ class BufferInterface:
         time: Any,
         timeout: Any = 0,
     ) -> Any:
-        """Return the pose of the source frame in the target frame: for subclasses to define."""
+        """Return the pose of the source frame in the target frame: for subclasses to define.
+
+        Raises:
+            NotImplementedException: always.
+        """
         raise NotImplementedException
 
     def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
@@ -126,6 +130,9 @@ class BufferInterface:
         """Return the pose of the source frame at one time in the target frame at another.
 
         For subclasses to define.
+
+        Raises:
+            NotImplementedException: always.
         """
         raise NotImplementedException
 
@@ -136,7 +143,11 @@ class BufferInterface:
         time: Any,
         timeout: Any = 0,
     ) -> Any:
-        """Return whether ``lookup_transform`` would answer: for subclasses to define."""
+        """Return whether ``lookup_transform`` would answer: for subclasses to define.
+
+        Raises:
+            NotImplementedException: always.
+        """
         raise NotImplementedException
 
     def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
@@ -172,7 +183,7 @@ class Buffer(BufferCore, BufferInterface):
     def __init__(self, cache_time: Any = None, node: Any = None) -> None:
         BufferCore.__init__(self, cache_time)
         BufferInterface.__init__(self)
-        #: Called while a lookup waits, to take messages that nobody else takes meanwhile.
+        #: Called while a lookup waits, to take messages that no executor takes.
         self.pollers: list[Callable[[], object]] = []
         self._jumps: dict[int, Any] = {}
         if node is not None:

@@ -190,7 +190,7 @@ class BufferCore(PoseBuffer):
             end_ns = min(end_ns, newest_ns) if newest_ns else end_ns
             return mean_velocity(pose_of, moving, end_ns - interval_ns, end_ns, time_ns)
 
-    # What the buffer holds, as tf2's tools print it.
+    # The buffer's content, as tf2's tools print it.
 
     def all_frames_as_string(self) -> str:
         """Return a line for each edge, in tf2's words."""

@@ -127,7 +127,7 @@ def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
     )
 
 
-# What the exceptions say.
+# Messages of the exceptions.
 
 
 class UnknownFrame:

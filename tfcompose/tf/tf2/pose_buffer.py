@@ -82,7 +82,7 @@ class PoseBuffer:
         self._lock = RLock()
         self._inserted = Condition(self._lock)
         self._waiting = 0
-        #: Called after something was taken, by whoever gave it.
+        #: Called after an insertion, in the inserting thread.
         self.on_insert: list[Callable[[], object]] = []
         self._caches: dict[str, TimeCache] = {}
         self._names: dict[str, None] = {}
@@ -121,8 +121,7 @@ class PoseBuffer:
         with self._lock:
             caches, cache_ns = self._caches, self.cache_ns
             for row in rows:
-                # What comes fifty thousand times a second: the next sample of an edge that stays
-                # as it is.
+                # The hot path, fifty thousand times a second: another sample of a known edge.
                 parent, child, sec, nsec, x, y, z, qx, qy, qz, qw = row
                 cache = caches.get(child)
                 if cache is not None and cache.parent == parent and cache.static is static:

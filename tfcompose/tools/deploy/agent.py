@@ -200,7 +200,11 @@ class Agent:
         self.archive.write(base64.b64decode(data))
 
     def unpack(self, release: str, *, wheels: bool) -> None:
-        """Unpack the archive into the release's folder, which appears only when complete."""
+        """Unpack the archive into the release's folder, which appears only when complete.
+
+        Raises:
+            HostError: if no archive was sent, or the wheels cannot be installed.
+        """
         folder, new = self.base / "releases" / release, self.base / "releases" / f".{release}.new"
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir(parents=True)
@@ -227,7 +231,11 @@ class Agent:
                 raise
 
     def rehearse(self, release: str, host: str) -> list[dict[str, Any]]:
-        """Return findings that prevent a start of the release on this host."""
+        """Return findings that prevent a start of the release on this host.
+
+        Raises:
+            HostError: if the host's tfcompose cannot check the plan.
+        """
         folder = self.base / "releases" / release
         python = self._python_of(folder)
         done = self._program([*self._start(python), "rehearse", str(folder / "plan.json"), host])

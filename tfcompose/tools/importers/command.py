@@ -337,7 +337,11 @@ def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: 
 
 
 def finish(draft: ImportDraft, arguments: Namespace) -> int:
-    """Write a draft, with lint's findings about it; return the exit code."""
+    """Write a draft, with lint's findings about it; return the exit code.
+
+    Raises:
+        SystemExit: if nothing was written.
+    """
     from dataclasses import replace
 
     from tfcompose.tools.importers.draft import text_with_findings

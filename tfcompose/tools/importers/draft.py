@@ -70,7 +70,7 @@ class ImportDraft:
     )
     #: Comments above entries.
     notes: dict[Entry, list[str]] = field(default_factory=dict)
-    #: What is not imported. Each finding is also a comment.
+    #: Omitted parts of the source. Each finding is also a comment.
     findings: list[Finding] = field(default_factory=list)
     #: Frames that sensors add. They are no roots.
     brought: set[str] = field(default_factory=set)
@@ -88,7 +88,8 @@ class ImportDraft:
     clocks: list[tuple[str, Any, Span | None]] = field(default_factory=list)
     #: Whether the robot keeps its launch files: each process is external.
     is_adopted: bool = False
-    #: Where a launch file starts publishers: of a fixed edge, by its child, and of a part.
+    #: Locations in a launch file that start publishers: of a fixed edge, by its child, and of a
+    #: part.
     publishers: dict[str, Span | None] = field(default_factory=dict)
 
     def note(self, path: Entry, *texts: str) -> None:

@@ -122,7 +122,7 @@ class _LaunchImport:
         self._delays: list[tuple[str, float]] = []
         self._missing: dict[str, Span] = {}
         self._saved: dict[str, Span] = {}
-        #: What components are loaded into: the ids of actions, or the full names of nodes.
+        #: Containers of components: the ids of actions, or the full names of nodes.
         self._loading = {
             record["container"] for record in records if record["kind"] == "component"
         }

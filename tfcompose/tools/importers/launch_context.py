@@ -34,10 +34,10 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
         LaunchRecording.__init__(self, find, every_branch=every_branch)
         #: Parameters of all nodes: mappings, and names of files.
         self.params: list[Any] = []
-        #: What loads the components that are visited: the id of its action, or the full name of
-        #: its node.
+        #: The container of the visited components: the id of its action, or the full name of its
+        #: node.
         self.container: str | None = None
-        #: What is visited when all else was: what events and timers start.
+        #: Visits of the actions of events and timers, after all others.
         self.later: deque[Callable[[], None]] = deque()
         self._environment = dict(os.environ)
         self._scopes: list[tuple[list[Any], dict[str, str]]] = []

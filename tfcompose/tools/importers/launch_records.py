@@ -200,7 +200,11 @@ def of_command(argv: list[str], text: str) -> str:
 
 
 def file_text(path: str) -> str:
-    """Return the text of a file, or a placeholder if its package is not found."""
+    """Return the text of a file, or a placeholder if its package is not found.
+
+    Raises:
+        FailedError: if the file cannot be read.
+    """
     if path.startswith(PACKAGE):
         return placeholder(path)
     try:

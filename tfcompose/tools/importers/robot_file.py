@@ -50,7 +50,7 @@ class Imported:
     robot: Robot
     #: The robot's name in the file.
     name: str
-    #: Where the file will be written.
+    #: Path of the file to write.
     target: Target
     sensors: tuple[Recognised, ...] = ()
     #: Comments by entry: what is left out, and why.

@@ -377,7 +377,7 @@ def plan_of_domain() -> Plan | None:
     running = run_of_domain()
     if running is None:
         return None
-    warn(f"{running[0].name} runs here, so its edges are expected")
+    warn(f"expecting the edges of {running[0].name}, which is running")
     return running[1]
 
 

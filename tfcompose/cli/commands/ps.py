@@ -65,7 +65,7 @@ def run(arguments: Namespace) -> int:
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
         state += f", {_count_by_severity(status.findings)}" if status.findings else ""
-        print(f"{name}: {state}, launcher {status.launcher}, since {uptime(status.uptime)}")
+        print(f"{name}: {state}, launcher {status.launcher}, up {uptime(status.uptime)}")
         for finding in status.findings:
             print(f"  {finding.severity}[{finding.code}] {finding.message}")
         rows = [HEAD, *(row(process, used) for process in status.processes)]

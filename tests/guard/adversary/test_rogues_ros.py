@@ -111,7 +111,7 @@ def test_a_program_of_another_dds_is_named_as_what_it_is_and_no_node_is_accused(
     pytest.importorskip("cyclonedds")
     after = len(robot.lines())
     started = rogue(foreign(OTHER_X, "map odom"))
-    robot.says("[TF801]", "map → odom", "a DDS program that is no ROS node", after=after)
+    robot.says("[TF801]", "map → odom", "a DDS program that is not a ROS node", after=after)
     PlainListener().until("odom", OTHER_X)
     robot.says("cannot be held back", after=after)
     robot.stop(started)

@@ -129,7 +129,7 @@ def test_a_child_that_left_its_session_is_named_by_its_own_process(robot: Robot)
 
 
 def test_a_child_of_another_dds_is_named_as_what_it_is_and_listeners_get_it(robot: Robot) -> None:
-    robot.says("TF803", "odom → foreign", "a DDS program that is no ROS node")
+    robot.says("TF803", "odom → foreign", "a DDS program that is not a ROS node")
     PlainListener().until("foreign", PLAIN_X)
     robot.says("cannot be held back")
 

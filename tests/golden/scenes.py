@@ -970,7 +970,7 @@ def deployed() -> Iterator[Finding]:
     for answers in (
         {"take_lock": {"holder": "ann@laptop, pid 7, since 12:00:00"}},
         {"state": STATE | STATUS | {"stranger": 4711}},
-        {"start": LostError("is lost: the connection has ended"), "back": LostError("is lost")},
+        {"start": LostError("lost its connection"), "back": LostError("is lost")},
         {
             "wait": STATUS | {"failed": True, "lines": ["tfcompose: error"]},
             "back": {"release": None, "active": False},

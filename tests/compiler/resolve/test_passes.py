@@ -28,7 +28,7 @@ READ_A_FILE = {
     "cli/linting.py",
     "cli/untrusted.py",
     "compiler/provenance.py",
-    "tools/view/edit.py",
+    "compiler/mounts/edit.py",
     "tools/importers/adopt.py",
     "tools/importers/command.py",
     "tools/importers/kits.py",

@@ -9,8 +9,8 @@ import viser
 
 from tests.tools.view.test_view import PRESETS, session_of
 from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.mounts.kinematics import poses_in_roots
 from tfcompose.tools.view.camera import VIEWS, Bounds
-from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.scene import RobotScene
 

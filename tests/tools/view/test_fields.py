@@ -8,11 +8,11 @@ import viser
 
 from tests.tools.view.test_view import PRESETS
 from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.mounts.kinematics import poses_in_roots
 from tfcompose.compiler.rays import contains, directions, is_plane
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.robot import Robot
 from tfcompose.tools.view.fields import FieldsOfView, outline, rims, streams, surface
-from tfcompose.tools.view.kinematics import poses_in_roots
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 CONE = "{range: {horizontal: 60 deg, vertical: 20 deg, near: 0.1, far: 0.4}}"

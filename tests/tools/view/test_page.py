@@ -9,8 +9,8 @@ from playwright.sync_api import Page
 from tests.support.browser import page_of
 from tests.support.cli import tfcompose_in
 from tests.tools.view.test_view import session_of
+from tfcompose.compiler.mounts.kinematics import poses_in_roots
 from tfcompose.tools.view.facts import numbers
-from tfcompose.tools.view.kinematics import poses_in_roots
 
 pytestmark = pytest.mark.xdist_group("browser")
 

@@ -22,12 +22,12 @@ from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.fixing import ChangedError, rewrite
 from tfcompose.cli.parser import parser_of
 from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.mounts.kinematics import poses_in_roots
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.geometry import Pose, offset_of, quat_from_rpy
 from tfcompose.model.plan.file import read_plan
 from tfcompose.tools.view import command
 from tfcompose.tools.view.camera import begin_at
-from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.plan_robot import robot_of_plan
 from tfcompose.tools.view.scene import RobotScene, colours_of

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
+from tfcompose.compiler.mounts.kinematics import joint_positions
 from tfcompose.foundation.text import list_names
 from tfcompose.model.plan.topics import joint_states_topic
-from tfcompose.tools.view.kinematics import joint_positions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tfcompose.compiler.mounts.kinematics import poses_in_roots
 from tfcompose.foundation.geometry import Pose
 from tfcompose.foundation.text import plural
 from tfcompose.tools.view.camera import VIEWS, Bounds
@@ -23,7 +24,6 @@ from tfcompose.tools.view.facts import facts_of
 from tfcompose.tools.view.fields import FIELD_COLOURS, outline, reach_at_scale, streams, surface
 from tfcompose.tools.view.frame_tree import FrameTree
 from tfcompose.tools.view.joints import first_positions, slider_range
-from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.scene import AXES_M, colour_of, colours_of, scale_of
 from tfcompose.tools.view.shapes import mesh_of
 

@@ -10,16 +10,16 @@ from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.compiler.mounts.edit import ImmovableError
+from tfcompose.compiler.mounts.kinematics import poses_in_roots
 from tfcompose.foundation.geometry import Pose, norm, quat_from_rpy
 from tfcompose.foundation.numbers import clean_rpy
 from tfcompose.foundation.text import list_names
 from tfcompose.tools.view.camera import VIEWS, begin_at, go_to, project
 from tfcompose.tools.view.choices import Choices
-from tfcompose.tools.view.edit import ImmovableError
 from tfcompose.tools.view.facts import facts_of, numbers
 from tfcompose.tools.view.findings import format_saved, paragraphs
 from tfcompose.tools.view.joints import slider_range
-from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.scene import RobotScene, wxyz
 from tfcompose.tools.view.tree_panel import TreePanel
 

@@ -8,17 +8,17 @@ from difflib import unified_diff
 from typing import TYPE_CHECKING
 
 from tfcompose.compiler.compile import Compiled
+from tfcompose.compiler.mounts.edit import Elsewhere, MountEdits, change_of, mount_of
 from tfcompose.foundation.findings import RejectedError, apply_edits
-from tfcompose.tools.view.edit import Elsewhere, MountEdits, change_of, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from collections.abc import Set as AbstractSet
 
+    from tfcompose.compiler.mounts.edit import Mount
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.geometry import Pose
     from tfcompose.model.robot import Robot
-    from tfcompose.tools.view.edit import Mount
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,8 @@ import shlex
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.compiler.mounts.kinematics import poses_in_roots
+from tfcompose.compiler.mounts.rotations import FORMS
 from tfcompose.foundation.findings import Edit
 from tfcompose.foundation.geometry import (
     OPTICAL_XYZW,
@@ -27,17 +29,15 @@ from tfcompose.model.robot import JOINTS, STATIC, is_optical
 from tfcompose.spec.language import DIRECTIONS
 from tfcompose.spec.load import load
 from tfcompose.spec.load.editing import MappingKeys, text_at, with_value
-from tfcompose.tools.view.kinematics import poses_in_roots
-from tfcompose.tools.view.rotations import FORMS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
+    from tfcompose.compiler.mounts.rotations import Numbers
     from tfcompose.foundation.findings import Span
     from tfcompose.foundation.geometry import Quaternion
     from tfcompose.model.robot import Edge, Robot
     from tfcompose.spec.load import Location, Path, Source
-    from tfcompose.tools.view.rotations import Numbers
 
 #: What a new number may be off, in metres or radians, for the sake of a short text; at a lever it
 #: is less.

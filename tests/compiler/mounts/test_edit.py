@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.mounts.edit import Elsewhere, ImmovableError, MountEdits, change_of
 from tfcompose.foundation.findings import apply_edits
 from tfcompose.foundation.geometry import (
     Pose,
@@ -25,7 +26,6 @@ from tfcompose.foundation.geometry import (
 )
 from tfcompose.model.robot import Robot
 from tfcompose.spec.load import load
-from tfcompose.tools.view.edit import Elsewhere, ImmovableError, MountEdits, change_of
 
 ROBOTS = Path(__file__).parents[3] / "robots"
 PRESETS = library()

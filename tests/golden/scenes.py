@@ -4,6 +4,7 @@ No process runs: what judges is given what it would have seen.
 """
 
 import asyncio
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -111,6 +112,10 @@ from tfcompose.tools.fleet.observe import EdgeStatus, FleetRobotStatus, LinkStat
 from tfcompose.tools.fleet.spec import validate_fleet
 from tfcompose.tools.importers.draft import ImportDraft
 from tfcompose.tools.importers.shell import add_script
+from tfcompose.tools.prove.command import findings_of
+from tfcompose.tools.prove.messages import CLOUDS, IMAGES, IMU, ODOMETRY, Topic
+from tfcompose.tools.prove.proof import Proof
+from tfcompose.tools.prove.recording import Measurements
 from tfcompose.tools.rebag import command as rebag
 from tfcompose.tools.rebag import play
 from tfcompose.tools.rebag.messages import MessageEditor
@@ -889,6 +894,32 @@ def corrected() -> Iterator[Finding]:
     yield from play.warnings_of(["base_link → bracket"])
 
 
+def proved() -> Iterator[Finding]:
+    """Measure with an IMU that is mounted or read otherwise, and with other frames."""
+    text = f"{ROVER}links: {{imu: {{parent: base_link}}, camera: {{parent: base_link}}}}\n"
+    compiled = compile_robot(text, "robot.yaml", library())
+    assert compiled.robot is not None
+    for force, rate in (
+        ((1, -1, -1), (1, -1, -1)),
+        ((1, 1, 1), (1, 1, -1)),
+        ((9, 9, 9), (57, 57, 57)),
+    ):
+        measurements = Measurements()
+        odometry = Topic("/odom", ODOMETRY, {"odom": 1}, child_frame="base_link")
+        imu = Topic("/imu", IMU, {"imu": 1})
+        for step in range(400):
+            at_s, yaw_rate = step / 20, 0.6 * math.sin(step / 20)
+            odometry.rows.append((at_s, 0.0, 0.0, yaw_rate))
+            forces = (0.0, 0.0, 9.81 * force[2])
+            imu.rows.append((at_s, *forces, 0.0, 0.0, yaw_rate * rate[2]))
+        image = Topic("/camera/camera_info", IMAGES[0], {"camera": 1})
+        scan = Topic("/scan", CLOUDS[0], {"lidr": 1})
+        topics = (odometry, imu, image, scan)
+        measurements.topics.update({topic.name: topic for topic in topics})
+        proof = Proof(compiled.robot, compiled.sources[0], {"robot.yaml": text}, measurements)
+        yield from findings_of(proof.verdicts())
+
+
 def imported() -> Iterator[Finding]:
     """A script of which a robot file cannot say all."""
     draft = ImportDraft("rover")
@@ -1013,6 +1044,7 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     recordings,
     imported,
     corrected,
+    proved,
     foreign_tools,
     confined,
     deployed,

@@ -201,6 +201,29 @@ def compile_or_exit(file: str, arguments: Namespace, day: date | None = None) ->
     return compile_without_errors(file, arguments, day)[0]
 
 
+def compile_file(
+    file: str,
+    arguments: Namespace,
+    day: date | None = None,
+    read: Callable[[str], str] = read_text,
+) -> Compiled:
+    """Return the compiled robot file; ``read`` returns a file's text.
+
+    Raises:
+        RejectedError: if a file cannot be read.
+    """
+    source = with_includes(load(read(file), file), read)
+    return compile_source(
+        source,
+        library(),
+        arguments.profiles,
+        overlays_of(arguments, read, source=source),
+        read,
+        disk_of(file, arguments),
+        inputs_of(arguments, day),
+    )
+
+
 def compile_without_errors(
     file: str, arguments: Namespace, day: date | None = None
 ) -> tuple[Robot, Compiled]:
@@ -210,16 +233,7 @@ def compile_without_errors(
         SystemExit: after printing its errors.
     """
     try:
-        source = with_includes(load(read_text(file), file), read_text)
-        compiled = compile_source(
-            source,
-            library(),
-            arguments.profiles,
-            overlays_of(arguments, source=source),
-            read_text,
-            disk_of(file, arguments),
-            inputs_of(arguments, day),
-        )
+        compiled = compile_file(file, arguments, day)
     except RejectedError as error:
         reject(error.findings)
     if compiled.robot is None or compiled.errors:

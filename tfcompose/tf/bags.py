@@ -8,7 +8,7 @@ from datetime import datetime, timezone
 from importlib.util import find_spec
 from pathlib import Path
 from struct import Struct
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.reading import exists, is_file, is_folder, names_in
@@ -20,7 +20,7 @@ from tfcompose.tf.tf2 import Buffer, TransformException
 from tfcompose.tf.tf2.pose_buffer import CACHE_NS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
     from datetime import date
 
     from typing_extensions import Self
@@ -77,6 +77,15 @@ def missing_rosbags() -> str | None:
         "bags are read with the package rosbags, which is not there: install it with pip install"
         " 'tfcompose[bag]'"
     )
+
+
+class TypedMessage(NamedTuple):
+    """One message of any type, as bytes."""
+
+    topic: str
+    #: As in the graph: ``sensor_msgs/msg/Imu``.
+    type: str
+    data: bytes
 
 
 class Recording:
@@ -148,6 +157,25 @@ class Recording:
                 raise damage_error(str(file), error) from None
         if not found:
             raise _no_topic(self.path, pairs, others)
+
+    def messages_of_types(self, types: Collection[str]) -> Iterator[TypedMessage]:
+        """Yield the messages of these types on all topics, in recorded order.
+
+        Raises:
+            BagError: if it is not a bag, or damaged.
+        """
+        from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
+
+        for file in self._files:
+            try:
+                with Reader(file) as reader:
+                    wanted = [each for each in reader.connections if each.msgtype in types]
+                    if not wanted:
+                        continue
+                    for connection, _, data in reader.messages(connections=wanted):
+                        yield TypedMessage(connection.topic, connection.msgtype, bytes(data))
+            except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
+                raise damage_error(str(file), error) from None
 
     def _with_clock(self, reader: Any, wanted: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
         """Yield the messages of these connections, and record /clock between them."""

@@ -18,7 +18,16 @@ from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.plan import switch_text
 from tfcompose.model.process_keys import PROCESS_KEYS
-from tfcompose.model.robot import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
+from tfcompose.model.robot import (
+    BUILT_IN,
+    STATIC,
+    Edge,
+    Link,
+    MountedSensor,
+    Node,
+    Process,
+    SensorTopic,
+)
 from tfcompose.spec.language.preset import Chosen
 from tfcompose.spec.load import find_path
 
@@ -222,6 +231,15 @@ class _Mounting:
             serial=sensor.options.get(serial) if serial else None,
             tf_at=self.span_of("tf"),
             optics=optics,
+            topics=tuple(
+                SensorTopic(
+                    topic_name,
+                    topic.type.replace("/", "/msg/"),
+                    self.rename(sensor.fill_name(topic.frame)),
+                )
+                for topic_name, topic in preset.topics.items()
+                if sensor.holds(topic.when)
+            ),
         )
 
     def check_overrides(self, mount: str) -> Iterator[Finding]:

@@ -34,6 +34,18 @@ def is_optical(frame: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorTopic:
+    """A topic that a sensor's driver publishes by default."""
+
+    #: As its driver names it: relative to the namespace, or to the node if it begins with ``~/``.
+    name: str
+    #: As in the graph: ``sensor_msgs/msg/Imu``.
+    type: str
+    #: The frame in its headers.
+    frame: str
+
+
+@dataclass(frozen=True, slots=True)
 class MountedSensor:
     """A sensor as the rules see it: the frames that it brings, and its driver."""
 
@@ -61,6 +73,8 @@ class MountedSensor:
     tf_at: Span | None = None
     #: The field of view of each stream, as far as it is known.
     optics: tuple[Optics, ...] = ()
+    #: What its driver publishes, as far as the preset knows.
+    topics: tuple[SensorTopic, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

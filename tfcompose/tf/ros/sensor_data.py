@@ -1,22 +1,19 @@
 """Sensor topics: joint states in the node's namespace, and headers of messages.
 
-Messages are bytes; ``joint_codec`` reads and writes joint states. std_msgs/Header is the first
-member of each type in ``HEADED``: int32 seconds, uint32 nanoseconds, and the frame as uint32
-length, bytes and a NUL that the length counts, after CDR's four bytes of header.
+Messages are bytes; ``joint_codec`` reads and writes joint states, ``header_codec`` reads headers.
 """
 
 from __future__ import annotations
 
-import struct
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from tfcompose.tf.ros.graph import gid_of
+from tfcompose.tf.ros.header_codec import read_header
 from tfcompose.tf.ros.joint_codec import encode_names, fill
 from tfcompose.tf.ros.node import JOINT_STATES, Subscription, qos
-from tfcompose.tf.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
 from tfcompose.tf.ros.typesupport import joint_state_type
 
 if TYPE_CHECKING:
@@ -74,23 +71,22 @@ HEADED = (
     "sensor_msgs/msg/Range",
     "nav_msgs/msg/Odometry",
 )
-#: Matches any publisher.
-_QOS = qos(5, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
-_SECOND_NS = 1_000_000_000
-_NAME_AT = 16
-_LONGEST = 1024
 
 
 class HeaderSubscription(Subscription):
     """A subscription to a topic of a type in ``HEADED``, or one that begins with a header.
 
+    It matches any publisher, and keeps the last ``depth`` messages until they are taken.
+
     Raises:
         ImportError: if the type is not installed.
     """
 
-    def __init__(self, node: Node, topic: str, type_: str) -> None:
+    def __init__(self, node: Node, topic: str, type_: str, depth: int = 5) -> None:
         package, _, name = type_.split("/")
-        super().__init__(node, getattr(import_module(f"{package}.msg"), name), topic, _QOS)
+        profile = qos(depth, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+        super().__init__(node, getattr(import_module(f"{package}.msg"), name), topic, profile)
+        self.type = type_
 
     def take_headers(self) -> list[tuple[str, int, int]]:
         """Return frame, stamp and arrival in nanoseconds of each received message.
@@ -103,15 +99,3 @@ class HeaderSubscription(Subscription):
             if header is not None:
                 found.append((*header, received.received_ns))
         return found
-
-
-def read_header(data: bytes) -> tuple[str, int] | None:
-    """Return a message's frame and stamp in nanoseconds, or None without a header."""
-    if len(data) < _NAME_AT or data[:2] not in {LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]}:
-        return None
-    seconds, nanoseconds, length = struct.unpack_from("<iII" if data[1] else ">iII", data, 4)
-    raw = data[_NAME_AT : _NAME_AT + min(length, _LONGEST)]
-    if length > _LONGEST or len(raw) < length:
-        return None
-    frame = raw.removesuffix(b"\0").decode(errors="replace")
-    return frame, seconds * _SECOND_NS + nanoseconds

@@ -1,0 +1,195 @@
+"""``tfcompose prove`` on recordings of a rover that MuJoCo simulates."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.support.bags import tfcompose_without_ros
+from tests.support.cli import tfcompose_in
+from tests.support.simulated_rover import (
+    Measured,
+    header,
+    message,
+    messages_of,
+    simulate,
+    write_bag,
+)
+
+ROBOT = """\
+tfcompose: 1
+robot: rover
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+  camera_link: {parent: base_link, xyz: [0.3, 0, 0.3]}
+  camera_optical_frame: {parent: camera_link, rpy: [-90 deg, 0, -90 deg]}
+sensors:
+  front_imu: {preset: generic/imu, parent: base_link, xyz: [5 cm, 0.02, 0.03]}
+processes:
+  drive: {external: true, node: diff_drive}
+"""
+MOUNT_LINE = 9
+Sent = list[tuple[str, float, str, Any]]
+
+
+@pytest.fixture(scope="module")
+def driven() -> Measured:
+    return simulate(seed=4, cloud_rate=0, seconds=16)
+
+
+def image_info(at_s: float, frame: str) -> tuple[str, float, str, Any]:
+    info = message(
+        "sensor_msgs/msg/CameraInfo",
+        header=header(at_s, frame),
+        height=480,
+        width=640,
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=np.ones(9),
+        r=np.ones(9),
+        p=np.ones(12),
+        binning_x=0,
+        binning_y=0,
+        roi=message(
+            "sensor_msgs/msg/RegionOfInterest",
+            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False,
+        ),
+    )  # fmt: skip
+    return ("/camera/camera_info", at_s, "sensor_msgs/msg/CameraInfo", info)
+
+
+@pytest.fixture
+def record(tmp_path: Path, driven: Measured) -> Callable[..., Path]:
+    """Return a function that writes robot.yaml and a bag, and returns their folder."""
+
+    def write(
+        *others: tuple[str, float, str, Any],
+        frame: str = "front_imu_link",
+        factors: tuple[float, float, float] = (1, 1, 1),
+        robot: str = ROBOT,
+    ) -> Path:
+        flipped = Measured(
+            [(at, force * factors, rate * factors) for at, force, rate in driven.imu],
+            driven.odometry,
+        )
+        sent = messages_of(flipped, {"imu": frame})
+        write_bag(tmp_path / "bag", sorted([*sent, *others], key=lambda each: each[1]))
+        (tmp_path / "robot.yaml").write_text(robot, "utf-8")
+        return tmp_path
+
+    return write
+
+
+def prove(folder: Path, *words: str, code: int = 0) -> tuple[dict[tuple[str, str], Any], str]:
+    """Return the checks by sensor and name, and what went to stderr."""
+    done = tfcompose_in(folder, "prove", "robot.yaml", "--bag", "bag", "--format", "json", *words)
+    assert done.returncode == code, done.stdout + done.stderr
+    checks = json.loads(done.stdout)["checks"]
+    return {(each["sensor"], each["check"]): each for each in checks}, done.stderr
+
+
+def test_a_right_mount_agrees_with_measured_values(record: Callable[..., Path]) -> None:
+    checks, errors = prove(record())
+    assert {name: check["answer"] for (_, name), check in checks.items()} == {
+        "frame": "agrees",
+        "gravity": "agrees",
+        "yaw rate": "agrees",
+        "heading": "agrees",
+    }
+    assert checks["front_imu", "yaw rate"]["values"]["scale"] == pytest.approx(1, abs=0.1)
+    assert not errors
+
+
+#: An IMU upside down about x sends these signs.
+FLIPPED = (1.0, -1.0, -1.0)
+
+
+def test_fix_writes_the_rotation_that_fits_and_leaves_the_rest(
+    record: Callable[..., Path],
+) -> None:
+    folder = record(factors=FLIPPED)
+    checks, errors = prove(folder, code=1)
+    assert checks["front_imu", "gravity"]["code"] == "TF650"
+    assert f"robot.yaml:{MOUNT_LINE}:" in errors
+    assert "[180 deg, 0 deg, 0 deg]" in errors
+    checks, errors = prove(folder, "--fix")
+    assert {check["answer"] for check in checks.values()} == {"agrees"}
+    expected = ROBOT.replace("0.03]}", "0.03], rpy: [180 deg, 0, 0]}")
+    assert (folder / "robot.yaml").read_text("utf-8") == expected
+
+
+def test_a_value_that_a_variable_holds_is_not_edited(record: Callable[..., Path]) -> None:
+    robot = ROBOT.replace("0.03]}", '0.03], rpy: ["${roll}", 0, 0]}').replace(
+        "frames:\n", "vars: {roll: 0 deg}\nframes:\n"
+    )
+    folder = record(factors=FLIPPED, robot=robot)
+    _, errors = prove(folder, "--fix", code=1)
+    assert "TF650" in errors
+    assert "${roll}" in errors, "the reason names it"
+    assert (folder / "robot.yaml").read_text("utf-8") == robot
+
+
+def test_rules_of_the_file_set_the_limit(record: Callable[..., Path]) -> None:
+    robot = ROBOT.replace("0.03]}", "0.03], rpy: [0, 6 deg, 0]}")
+    folder = record(robot=robot)
+    assert "TF650" in prove(folder, code=1)[1]
+    (folder / "robot.yaml").write_text(robot + "rules: {TF650: {limit: 10 deg}}\n", "utf-8")
+    prove(folder)
+
+
+def test_forces_of_another_scale_are_the_drivers_fault(
+    record: Callable[..., Path],
+) -> None:
+    folder = record(factors=(2.0, 2.0, 2.0))
+    _, errors = prove(folder, code=1)
+    assert "TF651" in errors
+    assert "TF650" not in errors
+
+
+@pytest.mark.parametrize(
+    ("frame", "answer"),
+    [("camera_optical_frame", "agrees"), ("camera_link", "differs"), ("lens", "differs")],
+)
+def test_images_need_a_declared_optical_frame(
+    frame: str, answer: str, record: Callable[..., Path]
+) -> None:
+    folder = record(*(image_info(at / 10, frame) for at in range(5)))
+    checks, errors = prove(folder, code=int(answer == "differs"))
+    name = next(sensor for sensor, check in checks if check == "frame" and sensor != "front_imu")
+    assert checks[name, "frame"]["answer"] == answer
+    assert ("TF652" in errors) == (answer == "differs")
+
+
+def test_only_named_sensors_are_checked(record: Callable[..., Path]) -> None:
+    folder = record(image_info(0.0, "camera_link"))
+    checks, _ = prove(folder, "front_imu")
+    assert {sensor for sensor, _ in checks} == {"front_imu"}
+    done = tfcompose_in(folder, "prove", "robot.yaml", "frnt_imu", "--bag", "bag")
+    assert done.returncode == 2
+    assert "front_imu" in done.stderr
+
+
+def test_a_sensor_that_sent_nothing_cannot_be_judged(record: Callable[..., Path]) -> None:
+    folder = record(frame="camera_link")
+    checks, _ = prove(folder, "front_imu", code=2)
+    assert checks["front_imu", "data"]["answer"] == "cannot tell"
+
+
+def test_bad_input_is_refused_before_anything_is_read(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(ROBOT, "utf-8")
+    done = tfcompose_in(tmp_path, "prove", "robot.yaml", "--bag", "none")
+    assert (done.returncode, "TF907" in done.stderr) == (2, True)
+    done = tfcompose_in(tmp_path, "prove", "robot.yaml", "--bag", "none", "--for", "3")
+    assert done.returncode == 2
+    done = tfcompose_in(tmp_path, "prove", "none.yaml", "--bag", "none")
+    assert (done.returncode, "TF001" in done.stderr) == (2, True)
+
+
+def test_a_recording_needs_no_ros(record: Callable[..., Path]) -> None:
+    folder = record()
+    done = tfcompose_without_ros("prove", str(folder / "robot.yaml"), "--bag", str(folder / "bag"))
+    assert "front_imu: gravity agrees" in done.stdout

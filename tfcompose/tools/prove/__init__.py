@@ -1,0 +1,1 @@
+"""Declared mounts against what sensors measure."""

@@ -1,0 +1,159 @@
+"""Compare declared mounts with what sensors measure.
+
+Read messages of the running robot, or of a recording, and compare them with the mounts that FILE
+declares. Each check agrees, differs, or cannot tell: without enough motion it says so. Gravity and
+yaw rate need an IMU, and yaw rate also odometry while the robot drives curves. Every message needs
+the frame that the file declares for it. Name sensors to check only those.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.options import add_bag, add_for, add_format, add_variant
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.plan import RosSettings
+    from tfcompose.tools.prove.recording import Measurements
+    from tfcompose.tools.prove.verdict import Verdict
+
+DURATION_S = 30.0
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("file", metavar="ROBOT", help="the robot file")
+    parser.add_argument(
+        "sensors", nargs="*", metavar="SENSOR", help="a sensor, or a frame; default: all"
+    )
+    add_variant(parser)
+    add_for(parser, f"listen for S seconds; default: {DURATION_S:g}")
+    add_bag(parser)
+    parser.add_argument(
+        "--fix", action="store_true", help="write the fitting values to the robot file"
+    )
+    add_format(parser)
+
+
+def run(arguments: Namespace) -> int:
+    """Check the sensors; exit code 0, 1 if one differs, 2 if no check could tell anything."""
+    from tfcompose.cli.compiling import compile_without_errors
+    from tfcompose.cli.reading import read_text
+
+    if arguments.bag and arguments.duration is not None:
+        fail("a recording is always read to its end: leave out --for", UNREADABLE)
+    robot, _ = compile_without_errors(arguments.file, arguments)
+    names = {sensor.name for sensor in robot.sensors} | robot.frames.keys()
+    for name in arguments.sensors:
+        if name not in names:
+            from tfcompose.foundation.findings import did_you_mean
+
+            advice = did_you_mean(name, names, f"{arguments.file} has other sensors")
+            fail(f"unknown sensor {name}; {advice}", UNREADABLE)
+    measurements = _measure(arguments, robot.ros)
+    prove = _prover(arguments, measurements)
+    verdicts = prove(read_text)
+    fixed = _fix(arguments, prove) if arguments.fix else []
+    if fixed:
+        verdicts = prove(read_text)
+    return _report(arguments, verdicts, fixed)
+
+
+def _measure(arguments: Namespace, ros: RosSettings) -> Measurements:
+    """Return what the sensors measure.
+
+    Raises:
+        SystemExit: after reporting why that cannot be read.
+    """
+    from tfcompose.cli.live import from_bag, set_up_ros
+    from tfcompose.foundation.findings import finding
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.tf.ros.environment import RosError
+
+    def read() -> Measurements:
+        with Stop() as stop:
+            if arguments.bag:
+                from tfcompose.tools.prove.recording import read_bag
+
+                return read_bag(arguments.bag, stop)
+            set_up_ros(ros)
+            from tfcompose.tools.prove.listening import listen  # rclpy reads the environment
+
+            return listen(arguments.duration or DURATION_S, stop)
+
+    try:
+        return from_bag(read)
+    except RosError as error:
+        reject([finding("TF901", str(error), None)])
+
+
+def _prover(
+    arguments: Namespace, measurements: Measurements
+) -> Callable[[Callable[[str], str]], list[Verdict]]:
+    """Return a function that proves the file as a reader returns it."""
+    from tfcompose.cli.compiling import compile_file
+    from tfcompose.tools.prove.proof import Proof
+
+    def prove(read: Callable[[str], str]) -> list[Verdict]:
+        compiled = compile_file(arguments.file, arguments, read=read)
+        if compiled.robot is None or compiled.errors:
+            reject(compiled.findings)
+        texts = {arguments.file: read(arguments.file)}
+        only = frozenset(arguments.sensors)
+        return Proof(compiled.robot, compiled.sources[0], texts, measurements, only).verdicts()
+
+    return prove
+
+
+def _fix(
+    arguments: Namespace, prove: Callable[[Callable[[str], str]], list[Verdict]]
+) -> list[Finding]:
+    """Write the values that fit, and return the findings that they remove.
+
+    Raises:
+        SystemExit: after reporting that the file cannot be written.
+    """
+    from tfcompose.cli.fixing import Fixer
+
+    def lint(_: str, read: Callable[[str], str]) -> list[Finding]:
+        return findings_of(prove(read))
+
+    fixer = Fixer([arguments.file], lint)
+    fixer.fix(arguments.file)
+    try:
+        fixer.write()
+    except OSError as error:
+        fail(f"{arguments.file} cannot be written: {error.strerror}", UNREADABLE)
+    return fixer.fixed
+
+
+def findings_of(verdicts: Sequence[Verdict]) -> list[Finding]:
+    """Return the findings of verdicts, in order of their places."""
+    findings = [verdict.finding for verdict in verdicts if verdict.finding]
+    return sorted(findings, key=lambda finding: finding.sort_key)
+
+
+def _report(arguments: Namespace, verdicts: list[Verdict], fixed: list[Finding]) -> int:
+    findings = findings_of(verdicts)
+    if arguments.format == "json":
+        entries = [verdict.as_json() for verdict in verdicts]
+        document = {"checks": entries, "fixed": [finding.message for finding in fixed]}
+        print(json.dumps(document, indent=2, ensure_ascii=False))
+    else:
+        for verdict in verdicts:
+            judgement = verdict.judgement
+            if judgement.answer != "differs":
+                print(f"{verdict.sensor}: {judgement.check} {judgement.answer}: {judgement.text}")
+        for finding in fixed:
+            print(f"fixed: {finding.message}")
+    print_findings(findings, sys.stderr)
+    if findings:
+        return FAILED
+    return 0 if any(each.judgement.answer == "agrees" for each in verdicts) else UNREADABLE

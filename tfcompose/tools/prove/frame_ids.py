@@ -1,0 +1,73 @@
+"""Frames in messages' headers, against those that the robot file declares for them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import did_you_mean
+from tfcompose.foundation.geometry import OPTICAL_XYZW, angle_between, multiply
+from tfcompose.model.robot import is_optical
+from tfcompose.tools.prove.messages import IMAGES
+from tfcompose.tools.prove.verdict import Judgement
+
+if TYPE_CHECKING:
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.model.robot import Robot
+    from tfcompose.tools.prove.messages import Topic
+
+CHECK = "frame"
+#: A body of a camera has x forward within this angle, in radians.
+_NEAR_RAD = 0.35
+
+
+def judge_frame(
+    robot: Robot, topic: Topic, declared: str, base_from_frames: dict[str, Pose]
+) -> Judgement:
+    """Return whether a topic's messages have the right frame.
+
+    ``declared`` is the frame that the driver should use, with the robot's prefix; empty if the
+    file does not say.
+    """
+    finals = {robot.final(name): name for name in robot.frames}
+    frame = topic.frame
+    if frame not in finals:
+        text = f"has frame_id {frame or '(empty)'}, which the file does not declare"
+        expected = declared or "a declared frame"
+        advice = did_you_mean(frame, finals, f"let the driver use {expected}")
+        return Judgement(CHECK, "differs", text, "TF652", advice)
+    if declared and frame != declared:
+        text = f"has frame_id {frame} instead of {declared}"
+        advice = f"set the driver's frame to {declared}, or change the sensor in the file"
+        return Judgement(CHECK, "differs", text, "TF652", advice)
+    if topic.type in IMAGES and not _is_optical(robot, finals[frame], base_from_frames):
+        text = f"sends images with frame_id {frame}, which is not an optical frame"
+        optical = [
+            robot.final(edge.child)
+            for edge in robot.edges
+            if edge.parent == finals[frame] and is_optical(edge.child)
+        ]
+        expected = optical[0] if optical else "an optical frame: z forward, x right, y down"
+        advice = f"let the driver use {expected} (REP-103)"
+        return Judgement(CHECK, "differs", text, "TF652", advice)
+    return Judgement(CHECK, "agrees", frame)
+
+
+def _is_optical(robot: Robot, frame: str, base_from_frames: dict[str, Pose]) -> bool:
+    """Return whether a frame is optical by its name, its preset, or its rotation."""
+    if is_optical(frame):
+        return True
+    if any(
+        optics.kind == "camera" and optics.frame == frame
+        for sensor in robot.sensors
+        for optics in sensor.optics
+    ):
+        return True
+    edge = robot.parent_edge(frame)
+    if edge is None or frame not in base_from_frames:
+        return False
+    x, y, z, w = OPTICAL_XYZW
+    body = multiply(base_from_frames[frame].quat_xyzw, (-x, -y, -z, w))
+    return (
+        angle_between(edge.pose.quat_xyzw, OPTICAL_XYZW) < _NEAR_RAD
+        or angle_between(body, (0.0, 0.0, 0.0, 1.0)) < _NEAR_RAD
+    )

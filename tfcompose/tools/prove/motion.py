@@ -1,0 +1,156 @@
+"""Motion that an IMU shares with odometry, by least squares over short intervals.
+
+Gravity and the base's accelerations show how the accelerometer's axes are rotated, yaw rates how
+the gyroscope's are. Uncertainties are standard errors from the scatter between stretches of the
+recording, so that noise that is correlated in time does not make them too small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tfcompose.tools.prove.messages import Imu, Odometry
+
+    Array = NDArray[np.float64]
+
+#: Measurements are averaged over intervals of this length, in seconds.
+INTERVAL_S = 0.1
+#: Fewer intervals than this say nothing.
+FEWEST = 20
+#: Into this many stretches a recording is divided for the scatter.
+STRETCHES = 8
+#: Below these standard deviations a motion does not excite a sensor: rad/s and m/s².
+LEAST_YAW_RATE = 0.08
+LEAST_ACCELERATION = 0.08
+#: Accelerations are those of speeds smoothed over this many intervals.
+_SMOOTHED = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A vector in an IMU's axes, with the standard error of its direction."""
+
+    #: Shape (3,).
+    vector: Array
+    #: In radians.
+    error_rad: float
+
+    @property
+    def length(self) -> float:
+        """The vector's length."""
+        return float(np.linalg.norm(self.vector))
+
+    @property
+    def direction(self) -> Array:
+        """The vector at unit length, shape (3,)."""
+        return self.vector / max(self.length, 1e-12)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What an IMU measures of a base's motion; None where the motion excites too little."""
+
+    #: Specific force at rest, in m/s²: it points up.
+    up: Estimate | None
+    #: Specific force for a unit acceleration forward: it points forward.
+    forward: Estimate | None
+    #: Measured rate for a unit yaw rate: it points along the yaw axis.
+    yaw_axis: Estimate | None
+    #: The standard deviation of the base's yaw rate, in rad/s.
+    yaw_rate_std: float = 0.0
+
+
+def motion_of(imu: Imu, odometry: Odometry | None, base_xyz: Array) -> Motion:
+    """Return the motion that an IMU measures at ``base_xyz``, its position in the base in m."""
+    if len(imu.stamps_s) < FEWEST:
+        return Motion(None, None, None)
+    if odometry is None or len(odometry.stamps_s) < FEWEST:
+        return Motion(_mean_force(imu), None, None)
+    begin = max(imu.stamps_s[0], odometry.stamps_s[0])
+    end = min(imu.stamps_s[-1], odometry.stamps_s[-1])
+    if end - begin < FEWEST * INTERVAL_S:
+        return Motion(_mean_force(imu), None, None)
+    edges = np.arange(begin, end, INTERVAL_S)
+    forces, rates = (means(imu.stamps_s, values, edges) for values in (imu.forces, imu.rates))
+    velocities = _smooth(means(odometry.stamps_s, odometry.velocities, edges))
+    yaw_rates = _smooth(means(odometry.stamps_s, odometry.yaw_rates[:, None], edges))[:, 0]
+    forces, rates = _smooth(forces), _smooth(rates)
+    accelerations = _accelerations(velocities, yaw_rates, base_xyz)
+    ones = np.ones(len(yaw_rates))
+    with_force = np.column_stack([ones, accelerations])
+    up, forward, left = _regress(with_force, forces)
+    _, yaw_axis = _regress(np.column_stack([ones, yaw_rates]), rates)
+    stds = accelerations.std(axis=0)
+    yaw_rate_std = float(yaw_rates.std())
+    is_rotated = yaw_rate_std >= LEAST_YAW_RATE
+    is_moved = max(stds) >= LEAST_ACCELERATION
+    if stds[1] > stds[0]:
+        forward = Estimate(np.cross(left.vector, up.direction), left.error_rad)
+    return Motion(
+        up if is_moved or is_rotated else _mean_force(imu),
+        forward if is_moved else None,
+        yaw_axis if is_rotated else None,
+        yaw_rate_std,
+    )
+
+
+def means(stamps_s: Array, values: Array, edges_s: Array) -> Array:
+    """Return the mean of values of shape (n, k) between neighbouring edges, shape (m - 1, k).
+
+    Between stamps values are the mean of both.
+    """
+    steps = np.diff(stamps_s)[:, None]
+    areas = np.vstack([np.zeros(values.shape[1]), (values[1:] + values[:-1]) / 2 * steps])
+    integrals = np.cumsum(areas, axis=0)
+    columns = [np.interp(edges_s, stamps_s, column) for column in integrals.T]
+    sums: Array = np.diff(np.column_stack(columns), axis=0)
+    return sums / np.diff(edges_s)[:, None]
+
+
+def _smooth(values: Array) -> Array:
+    """Return moving averages of the rows, which shortens them by ``_SMOOTHED - 1``."""
+    sums = np.cumsum(np.vstack([np.zeros(values.shape[1]), values]), axis=0)
+    smooth: Array = (sums[_SMOOTHED:] - sums[:-_SMOOTHED]) / _SMOOTHED
+    return smooth
+
+
+def _accelerations(velocities: Array, yaw_rates: Array, xyz: Array) -> Array:
+    """Return the accelerations forward and left of a point fixed to a base that moves in a plane.
+
+    Shape (n, 2), in m/s². dv/dt + ω × v + dω/dt × r + ω × (ω × r).
+    """
+    (x, y, _), along = xyz, np.gradient(velocities, INTERVAL_S, axis=0)
+    angular = np.gradient(yaw_rates, INTERVAL_S)
+    forward = along[:, 0] - yaw_rates * velocities[:, 1] - angular * y - yaw_rates**2 * x
+    left = along[:, 1] + yaw_rates * velocities[:, 0] + angular * x - yaw_rates**2 * y
+    return np.column_stack([forward, left])
+
+
+def _regress(inputs: Array, outputs: Array) -> list[Estimate]:
+    """Return for each column of inputs the vector by which outputs follow it.
+
+    The scatter is that of the solutions without one stretch each (delete-d jackknife).
+    """
+    vectors = np.linalg.lstsq(inputs, outputs, rcond=None)[0]
+    stretches = np.array_split(np.arange(len(inputs)), STRETCHES)
+    without = [
+        np.linalg.lstsq(
+            np.delete(inputs, stretch, axis=0), np.delete(outputs, stretch, axis=0), rcond=None
+        )[0]
+        for stretch in stretches
+    ]
+    variances = np.var(without, axis=0).sum(axis=1) * (STRETCHES - 1)
+    return [
+        Estimate(vector, float(np.sqrt(variance) / max(np.linalg.norm(vector), 1e-12)))
+        for vector, variance in zip(vectors, variances, strict=True)
+    ]
+
+
+def _mean_force(imu: Imu) -> Estimate:
+    return _regress(np.ones((len(imu.forces), 1)), imu.forces)[0]

@@ -1,0 +1,48 @@
+"""Measurements of sensors, by topic, and those of a bag."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.tf.bags import Recording
+from tfcompose.tf.ros.header_codec import read_header
+from tfcompose.tools.prove.messages import TYPES, Topic, decode
+
+if TYPE_CHECKING:
+    from tfcompose.foundation.signals import Stop
+
+
+class Measurements:
+    """What came on topics of sensors, by topic."""
+
+    def __init__(self) -> None:
+        self.topics: dict[str, Topic] = {}
+        #: Messages that are not of their topic's type, by topic.
+        self.malformed: dict[str, int] = {}
+
+    def take(self, name: str, type_: str, data: bytes) -> None:
+        """Add a message."""
+        topic = self.topics.setdefault(name, Topic(name, type_))
+        header = read_header(data)
+        try:
+            if header is None or topic.type != type_:
+                raise ValueError(type_)  # noqa: TRY301 (as if it could not be decoded)
+            decode(topic, data)
+        except Exception:  # noqa: BLE001 (rosbags raises anything for bytes of another type)
+            self.malformed[name] = self.malformed.get(name, 0) + 1
+            return
+        topic.frames[header[0]] = topic.frames.get(header[0], 0) + 1
+
+
+def read_bag(path: str, stop: Stop) -> Measurements:
+    """Return what a bag holds, up to a signal.
+
+    Raises:
+        BagError: if it cannot be read.
+    """
+    measurements = Measurements()
+    for message in Recording(path).messages_of_types(TYPES):
+        measurements.take(message.topic, message.type, message.data)
+        if stop.requested:
+            break
+    return measurements

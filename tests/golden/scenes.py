@@ -113,7 +113,7 @@ from tfcompose.tools.fleet.spec import validate_fleet
 from tfcompose.tools.importers.draft import ImportDraft
 from tfcompose.tools.importers.shell import add_script
 from tfcompose.tools.prove.command import findings_of
-from tfcompose.tools.prove.messages import CLOUDS, IMAGES, IMU, ODOMETRY, Topic
+from tfcompose.tools.prove.messages import CLOUDS, IMAGES, IMU, ODOMETRY, MeasuredTopic
 from tfcompose.tools.prove.proof import Proof
 from tfcompose.tools.prove.recording import Measurements
 from tfcompose.tools.rebag import command as rebag
@@ -905,15 +905,15 @@ def proved() -> Iterator[Finding]:
         ((9, 9, 9), (57, 57, 57)),
     ):
         measurements = Measurements()
-        odometry = Topic("/odom", ODOMETRY, {"odom": 1}, child_frame="base_link")
-        imu = Topic("/imu", IMU, {"imu": 1})
+        odometry = MeasuredTopic("/odom", ODOMETRY, {"odom": 1}, child_frame="base_link")
+        imu = MeasuredTopic("/imu", IMU, {"imu": 1})
         for step in range(400):
             at_s, yaw_rate = step / 20, 0.6 * math.sin(step / 20)
             odometry.rows.append((at_s, 0.0, 0.0, yaw_rate))
             forces = (0.0, 0.0, 9.81 * force[2])
             imu.rows.append((at_s, *forces, 0.0, 0.0, yaw_rate * rate[2]))
-        image = Topic("/camera/camera_info", IMAGES[0], {"camera": 1})
-        scan = Topic("/scan", CLOUDS[0], {"lidr": 1})
+        image = MeasuredTopic("/camera/camera_info", IMAGES[0], {"camera": 1})
+        scan = MeasuredTopic("/scan", CLOUDS[0], {"lidr": 1})
         topics = (odometry, imu, image, scan)
         measurements.topics.update({topic.name: topic for topic in topics})
         proof = Proof(compiled.robot, compiled.sources[0], {"robot.yaml": text}, measurements)

@@ -14,7 +14,7 @@ from tests.support.simulated_rover import MOUNTS, Measured, simulate
 from tfcompose.tools.prove.imu import ImuCheck
 from tfcompose.tools.prove.messages import Imu, Odometry
 from tfcompose.tools.prove.motion import means, motion_of
-from tfcompose.tools.prove.verdict import Judgement  # noqa: TC001 (named in annotations)
+from tfcompose.tools.prove.verdict import CheckResult  # noqa: TC001 (named in annotations)
 
 Array = NDArray[np.float64]
 LIMIT_RAD = math.radians(3)
@@ -41,7 +41,7 @@ class Fault:
 
     def judge(
         self, measured: Measured, *, with_odometry: bool = True, declared: Rotation | None = None
-    ) -> dict[str, Judgement]:
+    ) -> dict[str, CheckResult]:
         """Return the judgements by check on the faulty measurements."""
         device = Rotation.from_euler("xyz", self.rpy_deg, degrees=True).inv().as_matrix()
         times, forces, rates = (np.array(column) for column in zip(*measured.imu, strict=True))
@@ -132,7 +132,7 @@ def test_upside_down_at_rest_has_no_fit_for_the_sign_may_be_wrong(at_rest: Measu
 def test_a_handful_of_messages_tells_nothing() -> None:
     few = np.zeros((3, 3))
     motion = motion_of(Imu(np.arange(3.0), few, few), None, np.zeros(3))
-    answers = {each.answer for each in ImuCheck(motion, np.eye(3), LIMIT_RAD).judge()}
+    answers = {each.answer for each in ImuCheck(motion, np.identity(3), LIMIT_RAD).judge()}
     assert answers == {"cannot tell"}
 
 

@@ -185,7 +185,7 @@ def test_bad_input_is_refused_before_anything_is_read(tmp_path: Path) -> None:
     assert (done.returncode, "TF907" in done.stderr) == (2, True)
     done = tfcompose_in(tmp_path, "prove", "robot.yaml", "--bag", "none", "--for", "3")
     assert done.returncode == 2
-    done = tfcompose_in(tmp_path, "prove", "none.yaml", "--bag", "none")
+    done = tfcompose_in(tmp_path, "prove", "none.yaml", "--for", "1")
     assert (done.returncode, "TF001" in done.stderr) == (2, True)
 
 

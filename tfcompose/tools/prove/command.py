@@ -18,11 +18,12 @@ from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, rej
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Callable, Sequence
+    from datetime import date
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import RosSettings
     from tfcompose.tools.prove.recording import Measurements
-    from tfcompose.tools.prove.verdict import Verdict
+    from tfcompose.tools.prove.verdict import SensorVerdict
 
 DURATION_S = 30.0
 
@@ -45,11 +46,13 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Check the sensors; exit code 0, 1 if one differs, 2 if no check could tell anything."""
     from tfcompose.cli.compiling import compile_without_errors
+    from tfcompose.cli.live import recording_day
     from tfcompose.cli.reading import read_text
 
     if arguments.bag and arguments.duration is not None:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
-    robot, _ = compile_without_errors(arguments.file, arguments)
+    day = recording_day(arguments.bag)
+    robot, _ = compile_without_errors(arguments.file, arguments, day)
     names = {sensor.name for sensor in robot.sensors} | robot.frames.keys()
     for name in arguments.sensors:
         if name not in names:
@@ -58,7 +61,7 @@ def run(arguments: Namespace) -> int:
             advice = did_you_mean(name, names, f"{arguments.file} has other sensors")
             fail(f"unknown sensor {name}; {advice}", UNREADABLE)
     measurements = _measure(arguments, robot.ros)
-    prove = _prover(arguments, measurements)
+    prove = _prover(arguments, measurements, day)
     verdicts = prove(read_text)
     fixed = _fix(arguments, prove) if arguments.fix else []
     if fixed:
@@ -95,14 +98,14 @@ def _measure(arguments: Namespace, ros: RosSettings) -> Measurements:
 
 
 def _prover(
-    arguments: Namespace, measurements: Measurements
-) -> Callable[[Callable[[str], str]], list[Verdict]]:
+    arguments: Namespace, measurements: Measurements, day: date | None
+) -> Callable[[Callable[[str], str]], list[SensorVerdict]]:
     """Return a function that proves the file as a reader returns it."""
     from tfcompose.cli.compiling import compile_file
     from tfcompose.tools.prove.proof import Proof
 
-    def prove(read: Callable[[str], str]) -> list[Verdict]:
-        compiled = compile_file(arguments.file, arguments, read=read)
+    def prove(read: Callable[[str], str]) -> list[SensorVerdict]:
+        compiled = compile_file(arguments.file, arguments, day, read)
         if compiled.robot is None or compiled.errors:
             reject(compiled.findings)
         texts = {arguments.file: read(arguments.file)}
@@ -113,7 +116,7 @@ def _prover(
 
 
 def _fix(
-    arguments: Namespace, prove: Callable[[Callable[[str], str]], list[Verdict]]
+    arguments: Namespace, prove: Callable[[Callable[[str], str]], list[SensorVerdict]]
 ) -> list[Finding]:
     """Write the values that fit, and return the findings that they remove.
 
@@ -134,13 +137,13 @@ def _fix(
     return fixer.fixed
 
 
-def findings_of(verdicts: Sequence[Verdict]) -> list[Finding]:
+def findings_of(verdicts: Sequence[SensorVerdict]) -> list[Finding]:
     """Return the findings of verdicts, in order of their places."""
     findings = [verdict.finding for verdict in verdicts if verdict.finding]
     return sorted(findings, key=lambda finding: finding.sort_key)
 
 
-def _report(arguments: Namespace, verdicts: list[Verdict], fixed: list[Finding]) -> int:
+def _report(arguments: Namespace, verdicts: list[SensorVerdict], fixed: list[Finding]) -> int:
     findings = findings_of(verdicts)
     if arguments.format == "json":
         entries = [verdict.as_json() for verdict in verdicts]

@@ -8,12 +8,12 @@ from tfcompose.foundation.findings import did_you_mean
 from tfcompose.foundation.geometry import OPTICAL_XYZW, angle_between, multiply
 from tfcompose.model.robot import is_optical
 from tfcompose.tools.prove.messages import IMAGES
-from tfcompose.tools.prove.verdict import Judgement
+from tfcompose.tools.prove.verdict import CheckResult
 
 if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Pose
     from tfcompose.model.robot import Robot
-    from tfcompose.tools.prove.messages import Topic
+    from tfcompose.tools.prove.messages import MeasuredTopic
 
 CHECK = "frame"
 #: A body of a camera has x forward within this angle, in radians.
@@ -21,8 +21,8 @@ _NEAR_RAD = 0.35
 
 
 def judge_frame(
-    robot: Robot, topic: Topic, declared: str, base_from_frames: dict[str, Pose]
-) -> Judgement:
+    robot: Robot, topic: MeasuredTopic, declared: str, base_from_frames: dict[str, Pose]
+) -> CheckResult:
     """Return whether a topic's messages have the right frame.
 
     ``declared`` is the frame that the driver should use, with the robot's prefix; empty if the
@@ -34,11 +34,11 @@ def judge_frame(
         text = f"has frame_id {frame or '(empty)'}, which the file does not declare"
         expected = declared or "a declared frame"
         advice = did_you_mean(frame, finals, f"let the driver use {expected}")
-        return Judgement(CHECK, "differs", text, "TF652", advice)
+        return CheckResult(CHECK, "differs", text, "TF652", advice)
     if declared and frame != declared:
         text = f"has frame_id {frame} instead of {declared}"
         advice = f"set the driver's frame to {declared}, or change the sensor in the file"
-        return Judgement(CHECK, "differs", text, "TF652", advice)
+        return CheckResult(CHECK, "differs", text, "TF652", advice)
     if topic.type in IMAGES and not _is_optical(robot, finals[frame], base_from_frames):
         text = f"sends images with frame_id {frame}, which is not an optical frame"
         optical = [
@@ -48,8 +48,8 @@ def judge_frame(
         ]
         expected = optical[0] if optical else "an optical frame: z forward, x right, y down"
         advice = f"let the driver use {expected} (REP-103)"
-        return Judgement(CHECK, "differs", text, "TF652", advice)
-    return Judgement(CHECK, "agrees", frame)
+        return CheckResult(CHECK, "differs", text, "TF652", advice)
+    return CheckResult(CHECK, "agrees", frame)
 
 
 def _is_optical(robot: Robot, frame: str, base_from_frames: dict[str, Pose]) -> bool:

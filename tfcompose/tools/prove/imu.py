@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tfcompose.foundation.geometry import matrix_from_quat, quat_from_matrix, rpy_from_quat
-from tfcompose.tools.prove.verdict import Judgement
+from tfcompose.tools.prove.verdict import CheckResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,16 +54,16 @@ class ImuCheck:
     #: By how much gravity may be tilted, in radians.
     limit_rad: float
 
-    def judge(self) -> Iterator[Judgement]:
+    def judge(self) -> Iterator[CheckResult]:
         """Yield the judgements on gravity, yaw rate and heading."""
         yield self._judge_gravity()
         yield from self._judge_yaw_rate()
         yield from self._judge_heading()
 
-    def _judge_gravity(self) -> Judgement:
+    def _judge_gravity(self) -> CheckResult:
         up, check = self.motion.up, "gravity"
         if up is None:
-            return Judgement(check, "cannot tell", "too few messages came")
+            return CheckResult(check, "cannot tell", "too few messages came")
         if not _within(up.length / G, _G_RANGE):
             return self._judge_force(up)
         tilt = self._tilt_rad(up)
@@ -74,24 +74,24 @@ class ImuCheck:
         if not self._is_beyond(tilt, up):
             if self._is_vague(up):
                 reason = f"gravity scatters by {math.degrees(up.error_rad):.0f} deg"
-                return Judgement(check, "cannot tell", reason, values=values)
-            return Judgement(check, "agrees", measured, values=values)
+                return CheckResult(check, "cannot tell", reason, values=values)
+            return CheckResult(check, "agrees", measured, values=values)
         if self._signs_differ() and tilt > _UPSIDE_DOWN_RAD:
             text = "measures gravity downward while its yaw rate agrees"
             advice = (
                 "the driver reports gravity instead of the force against it (REP-145):"
                 " change the sign of linear_acceleration"
             )
-            return Judgement(check, "differs", text, "TF651", advice, values=values)
+            return CheckResult(check, "differs", text, "TF651", advice, values=values)
         text = f"measures gravity {measured} in the declared mount"
         rotation, why_not = self._fit(up)
         if rotation is None:
-            return Judgement(check, "differs", text, "TF650", why_not, values=values)
-        return Judgement(
+            return CheckResult(check, "differs", text, "TF650", why_not, values=values)
+        return CheckResult(
             check, "differs", text, "TF650", base_from_frame_xyzw=rotation, values=values
         )
 
-    def _judge_force(self, up: Estimate) -> Judgement:
+    def _judge_force(self, up: Estimate) -> CheckResult:
         values = {"force_m_s2": up.length}
         text = f"measures gravity as {up.length:.2f} m/s²"
         advice = "check the driver's scale; REP-145 has m/s²"
@@ -100,20 +100,20 @@ class ImuCheck:
         elif up.length < 1.0:
             text = f"measures no gravity: {up.length:.2f} m/s²"
             advice = "the driver removes gravity: linear_acceleration has to contain it (REP-145)"
-        return Judgement("gravity", "differs", text, "TF651", advice, values=values)
+        return CheckResult("gravity", "differs", text, "TF651", advice, values=values)
 
-    def _judge_yaw_rate(self) -> Iterator[Judgement]:
+    def _judge_yaw_rate(self) -> Iterator[CheckResult]:
         """Yield the judgement on the gyroscope; none if gravity shows the same other mount."""
         axis, check = self.motion.yaw_axis, "yaw rate"
         if axis is None:
             degrees = math.degrees(self.motion.yaw_rate_std)
             reason = f"the base hardly rotates by odometry ({degrees:.1f} deg/s): drive curves"
-            yield Judgement(check, "cannot tell", reason)
+            yield CheckResult(check, "cannot tell", reason)
             return
         if self._is_vague(axis):
             degrees = math.degrees(axis.error_rad)
             reason = f"the axis of its rates scatters by {degrees:.0f} deg"
-            yield Judgement(check, "cannot tell", reason)
+            yield CheckResult(check, "cannot tell", reason)
             return
         tilt = self._tilt_rad(axis)
         values = {"scale": axis.length, "tilt_rad": tilt, "error_rad": axis.error_rad}
@@ -126,16 +126,16 @@ class ImuCheck:
                 advice = "the driver has to report rad/s (REP-103)"
             elif _within(axis.length * math.degrees(1), _RATE_RANGE):
                 advice = "the driver converts to radians twice"
-            yield Judgement(check, "differs", text, "TF651", advice, values=values)
+            yield CheckResult(check, "differs", text, "TF651", advice, values=values)
             return
         if tilt <= _SAME_RAD:
-            yield Judgement(check, "agrees", measured, values=values)
+            yield CheckResult(check, "agrees", measured, values=values)
             return
         up = self.motion.up
         if up is None or not _within(up.length / G, _G_RANGE):
             text = f"measures the base's yaw {_axis_name(self.base_from_frame, axis)}"
             advice = "gravity is not measured, so the mount is not known"
-            yield Judgement(check, "differs", text, "TF651", advice, values=values)
+            yield CheckResult(check, "differs", text, "TF651", advice, values=values)
             return
         apart = _angle(axis.direction, up.direction)
         if apart <= _SAME_RAD:
@@ -148,10 +148,10 @@ class ImuCheck:
                 "the driver, or the odometry, has the wrong sign: z is positive counter-clockwise"
                 " (REP-103)"
             )
-        yield Judgement(check, "differs", text, "TF651", advice, values=values)
+        yield CheckResult(check, "differs", text, "TF651", advice, values=values)
         return
 
-    def _judge_heading(self) -> Iterator[Judgement]:
+    def _judge_heading(self) -> Iterator[CheckResult]:
         """Yield whether accelerations point forward; nothing if the base hardly accelerates."""
         forward, up = self.motion.forward, self.motion.up
         if forward is None or up is None or forward.error_rad > _VAGUE_RAD:
@@ -164,11 +164,11 @@ class ImuCheck:
         values = {"yaw_rad": yaw, "error_rad": forward.error_rad}
         text = f"{math.degrees(yaw):.1f} ± {error:.1f} deg from forward"
         if abs(yaw) <= _YAW_RAD + _SIGMAS * forward.error_rad:
-            yield Judgement("heading", "agrees", text, values=values)
+            yield CheckResult("heading", "agrees", text, values=values)
             return
         rotation, _ = self._fit(up)
         text = f"measures forward accelerations {text} in the declared mount"
-        yield Judgement(
+        yield CheckResult(
             "heading", "differs", text, "TF650", base_from_frame_xyzw=rotation, values=values
         )
         return
@@ -266,7 +266,7 @@ def _level(rotation: Array, up: Array) -> Array:
         return rotation
     x, y, z = axis / sine
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    change: Array = np.eye(3) + sine * skew + (1 - cosine) * skew @ skew
+    change: Array = np.identity(3) + sine * skew + (1 - cosine) * skew @ skew
     return change @ rotation
 
 

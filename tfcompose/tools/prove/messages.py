@@ -23,7 +23,7 @@ _SECOND_NS = 1_000_000_000
 
 
 @dataclass(slots=True)
-class Topic:
+class MeasuredTopic:
     """What came on one topic."""
 
     name: str
@@ -65,7 +65,7 @@ class Odometry:
     yaw_rates: NDArray[np.float64]
 
 
-def decode(topic: Topic, data: bytes) -> None:
+def decode(topic: MeasuredTopic, data: bytes) -> None:
     """Add a message's numbers to its topic.
 
     Raises:
@@ -85,19 +85,19 @@ def decode(topic: Topic, data: bytes) -> None:
     topic.rows.append((stamp_s, linear.x, linear.y, angular.z))
 
 
-def imu_of(topic: Topic) -> Imu:
+def imu_of(topic: MeasuredTopic) -> Imu:
     """Return the measurements of an IMU's topic, those that are numbers."""
     rows = _array(topic, 7)
     return Imu(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
 
-def odometry_of(topic: Topic) -> Odometry:
+def odometry_of(topic: MeasuredTopic) -> Odometry:
     """Return the motion on a topic of odometry, as far as it is numbers."""
     rows = _array(topic, 4)
     return Odometry(rows[:, 0], rows[:, 1:3], rows[:, 3])
 
 
-def _array(topic: Topic, columns: int) -> NDArray[np.float64]:
+def _array(topic: MeasuredTopic, columns: int) -> NDArray[np.float64]:
     rows = np.array(topic.rows, dtype=np.float64).reshape(-1, columns)
     rows = rows[np.isfinite(rows).all(axis=1)]
     _, first = np.unique(rows[:, 0], return_index=True)

@@ -82,10 +82,10 @@ def motion_of(imu: Imu, odometry: Odometry | None, base_xyz: Array) -> Motion:
     yaw_rates = _smooth(means(odometry.stamps_s, odometry.yaw_rates[:, None], edges))[:, 0]
     forces, rates = _smooth(forces), _smooth(rates)
     accelerations = _accelerations(velocities, yaw_rates, base_xyz)
-    ones = np.ones(len(yaw_rates))
-    with_force = np.column_stack([ones, accelerations])
+    constant = np.ones(len(yaw_rates))
+    with_force = np.column_stack([constant, accelerations])
     up, forward, left = _regress(with_force, forces)
-    _, yaw_axis = _regress(np.column_stack([ones, yaw_rates]), rates)
+    _, yaw_axis = _regress(np.column_stack([constant, yaw_rates]), rates)
     stds = accelerations.std(axis=0)
     yaw_rate_std = float(yaw_rates.std())
     is_rotated = yaw_rate_std >= LEAST_YAW_RATE

@@ -19,7 +19,7 @@ from tfcompose.tools.prove.frame_ids import judge_frame
 from tfcompose.tools.prove.imu import ImuCheck, describe_rotation, matrix_of
 from tfcompose.tools.prove.messages import IMU, ODOMETRY, imu_of, odometry_of
 from tfcompose.tools.prove.motion import motion_of
-from tfcompose.tools.prove.verdict import Judgement, Verdict
+from tfcompose.tools.prove.verdict import CheckResult, SensorVerdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Quaternion
     from tfcompose.model.robot import Edge, MountedSensor, Robot
     from tfcompose.spec.load import Source
-    from tfcompose.tools.prove.messages import Odometry, Topic
+    from tfcompose.tools.prove.messages import MeasuredTopic, Odometry
     from tfcompose.tools.prove.recording import Measurements
 
 
@@ -49,7 +49,7 @@ class Proof:
     #: Sensors or frames to check; empty: all.
     only: frozenset[str] = frozenset()
 
-    def verdicts(self) -> list[Verdict]:
+    def verdicts(self) -> list[SensorVerdict]:
         """Return the verdicts of all checks, by sensor and topic."""
         poses = self._base_from_frames()
         odometry = self._odometry()
@@ -62,7 +62,7 @@ class Proof:
         ]
         received = {verdict.sensor for verdict in verdicts}
         verdicts += [
-            Verdict(name, "", Judgement("data", "cannot tell", "no message came"))
+            SensorVerdict(name, "", CheckResult("data", "cannot tell", "no message came"))
             for name in sorted(self.only or {sensor.name for sensor in self._measuring()})
             if name not in received
         ]
@@ -74,8 +74,8 @@ class Proof:
         return (sensor for sensor in self.robot.sensors if sensor.kind in kinds)
 
     def _verdicts_on(
-        self, topic: Topic, poses: dict[str, Pose], odometry: Odometry | None
-    ) -> Iterator[Verdict]:
+        self, topic: MeasuredTopic, poses: dict[str, Pose], odometry: Odometry | None
+    ) -> Iterator[SensorVerdict]:
         declared, sensor = self._declared(topic)
         frame = next((name for name in self.robot.frames if self._is_frame(topic, name)), "")
         if sensor is None:
@@ -86,12 +86,12 @@ class Proof:
             judgements += self._judge_imu(topic, frame, poses, odometry)
         for judgement in judgements:
             found = self._finding(name, topic, judgement, sensor, frame, poses)
-            yield Verdict(name, topic.name, judgement, found)
+            yield SensorVerdict(name, topic.name, judgement, found)
 
-    def _is_frame(self, topic: Topic, name: str) -> bool:
+    def _is_frame(self, topic: MeasuredTopic, name: str) -> bool:
         return self.robot.final(name) == topic.frame
 
-    def _declared(self, topic: Topic) -> tuple[str, MountedSensor | None]:
+    def _declared(self, topic: MeasuredTopic) -> tuple[str, MountedSensor | None]:
         """Return the frame that a preset's driver uses on this topic, and the sensor."""
         for sensor in self.robot.sensors:
             for published in sensor.topics:
@@ -125,7 +125,7 @@ class Proof:
         best = max(topics, key=lambda topic: len(topic.rows), default=None)
         return odometry_of(best) if best else None
 
-    def _is_of_base(self, topic: Topic) -> bool:
+    def _is_of_base(self, topic: MeasuredTopic) -> bool:
         """Return whether odometry is that of the base, or of what is fixed level above it."""
         poses = self._base_from_frames()
         names = [name for name in poses if self.robot.final(name) == topic.child_frame]
@@ -155,11 +155,11 @@ class Proof:
         return True
 
     def _judge_imu(
-        self, topic: Topic, frame: str, poses: dict[str, Pose], odometry: Odometry | None
-    ) -> Iterator[Judgement]:
+        self, topic: MeasuredTopic, frame: str, poses: dict[str, Pose], odometry: Odometry | None
+    ) -> Iterator[CheckResult]:
         if frame not in poses:
             reason = f"{frame} is not fixed to {self.robot.base or 'one base'}"
-            yield Judgement("gravity", "cannot tell", reason)
+            yield CheckResult("gravity", "cannot tell", reason)
             return
         pose = poses[frame]
         motion = motion_of(imu_of(topic), odometry, np.array(pose.xyz))
@@ -175,8 +175,8 @@ class Proof:
     def _finding(  # noqa: PLR0913, PLR0917 (what a finding is made of)
         self,
         name: str,
-        topic: Topic,
-        judgement: Judgement,
+        topic: MeasuredTopic,
+        judgement: CheckResult,
         sensor: MountedSensor | None,
         frame: str,
         poses: dict[str, Pose],

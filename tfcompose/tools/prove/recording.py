@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.tf.bags import Recording
 from tfcompose.tf.ros.header_codec import read_header
-from tfcompose.tools.prove.messages import TYPES, Topic, decode
+from tfcompose.tools.prove.messages import TYPES, MeasuredTopic, decode
 
 if TYPE_CHECKING:
     from tfcompose.foundation.signals import Stop
@@ -16,13 +16,13 @@ class Measurements:
     """What came on topics of sensors, by topic."""
 
     def __init__(self) -> None:
-        self.topics: dict[str, Topic] = {}
+        self.topics: dict[str, MeasuredTopic] = {}
         #: Messages that are not of their topic's type, by topic.
         self.malformed: dict[str, int] = {}
 
     def take(self, name: str, type_: str, data: bytes) -> None:
         """Add a message."""
-        topic = self.topics.setdefault(name, Topic(name, type_))
+        topic = self.topics.setdefault(name, MeasuredTopic(name, type_))
         header = read_header(data)
         try:
             if header is None or topic.type != type_:

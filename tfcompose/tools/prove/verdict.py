@@ -13,7 +13,7 @@ Answer = Literal["agrees", "differs", "cannot tell"]
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class CheckResult:
     """The answer of one check about one topic."""
 
     check: str
@@ -32,12 +32,12 @@ class Judgement:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class SensorVerdict:
     """A judgement with its sensor, topic and finding."""
 
     sensor: str
     topic: str
-    judgement: Judgement
+    judgement: CheckResult
     #: The finding if it differs.
     finding: Finding | None = None
 

@@ -118,6 +118,7 @@ def test_without_motion_only_gravity_is_known(at_rest: Measured) -> None:
     assert {name: judgement.answer for name, judgement in found.items()} == {
         "gravity": "agrees",
         "yaw rate": "cannot tell",
+        "heading": "cannot tell",
     }
     assert Fault().judge(at_rest, with_odometry=False)["yaw rate"].answer == "cannot tell"
 
@@ -141,3 +142,20 @@ def test_means_over_intervals_are_areas_below_the_lines_between_samples() -> Non
     values = stamps[:, None] * [2.0, -1.0]
     expected = [[0.5, -0.25], [1.5, -0.75]]
     assert np.allclose(means(stamps, values, np.array([0.0, 0.5, 1.0])), expected)
+
+
+def test_a_heading_without_accelerations_is_not_measured(at_rest: Measured) -> None:
+    odometry = at_rest.odometry
+    rotating = Measured(
+        [(at, force, rate + np.array([0, 0, math.sin(at)])) for at, force, rate in at_rest.imu],
+        [(at, 0.0, 0.0, math.sin(at)) for at, *_ in odometry],
+    )
+    found = Fault().judge(rotating)
+    assert {name: result.answer for name, result in found.items()} == {
+        "gravity": "agrees",
+        "yaw rate": "agrees",
+        "heading": "cannot tell",
+    }
+    flipped = Fault((180, 0, 0)).judge(rotating)["gravity"]
+    assert flipped.base_from_frame_xyzw is not None
+    assert "heading is not measured" in flipped.help

@@ -193,3 +193,23 @@ def test_a_recording_needs_no_ros(record: Callable[..., Path]) -> None:
     folder = record()
     done = tfcompose_without_ros("prove", str(folder / "robot.yaml"), "--bag", str(folder / "bag"))
     assert "front_imu: gravity agrees" in done.stdout
+
+
+def test_a_presets_topic_needs_the_frame_of_its_sensor(record: Callable[..., Path]) -> None:
+    """The driver's topic, moved by a remapping, has the frame of another sensor."""
+    scanner = (
+        "sensors:\n  scanner: {preset: rplidar/a2, parent: base_link, xyz: [0.1, 0, 0.2],"
+        " driver: {remap: {scan: front_scan}}}\n"
+    )
+    scan = message(
+        "sensor_msgs/msg/LaserScan",
+        header=header(1.0, "camera_link"),
+        angle_min=0.0, angle_max=1.0, angle_increment=0.5, time_increment=0.0, scan_time=0.1,
+        range_min=0.1, range_max=9.0,
+        ranges=np.ones(3, dtype=np.float32), intensities=np.zeros(0, dtype=np.float32),
+    )  # fmt: skip
+    sent = ("/scanner/front_scan", 1.0, "sensor_msgs/msg/LaserScan", scan)
+    folder = record(sent, robot=ROBOT.replace("sensors:\n", scanner))
+    checks, errors = prove(folder, code=1)
+    assert checks["scanner", "frame"]["code"] == "TF652"
+    assert "instead of scanner" in errors

@@ -87,9 +87,11 @@ class ImuCheck:
         rotation, why_not = self._fit(up)
         if rotation is None:
             return CheckResult(check, "differs", text, "TF650", why_not, values=values)
-        return CheckResult(
-            check, "differs", text, "TF650", base_from_frame_xyzw=rotation, values=values
-        )
+        forward = self.motion.forward
+        advice = ""
+        if forward is None or forward.error_rad > _VAGUE_RAD:
+            advice = "; its heading is not measured: speed up and brake while prove listens"
+        return CheckResult(check, "differs", text, "TF650", advice, rotation, values)
 
     def _judge_force(self, up: Estimate) -> CheckResult:
         values = {"force_m_s2": up.length}
@@ -152,11 +154,17 @@ class ImuCheck:
         return
 
     def _judge_heading(self) -> Iterator[CheckResult]:
-        """Yield whether accelerations point forward; nothing if the base hardly accelerates."""
+        """Yield whether accelerations point forward; nothing if gravity shows another mount."""
         forward, up = self.motion.forward, self.motion.up
-        if forward is None or up is None or forward.error_rad > _VAGUE_RAD:
+        if up is None or self._is_beyond(self._tilt_rad(up), up):
             return
-        if self._is_beyond(self._tilt_rad(up), up) or not _within(forward.length, (0.5, 2.0)):
+        if forward is None or forward.error_rad > _VAGUE_RAD:
+            reason = "the base hardly accelerates by odometry: speed up and brake"
+            yield CheckResult("heading", "cannot tell", reason)
+            return
+        if not _within(forward.length, (0.5, 2.0)):
+            reason = "accelerations do not follow odometry's"
+            yield CheckResult("heading", "cannot tell", reason)
             return
         x, y, _ = self.base_from_frame @ forward.direction
         yaw = math.atan2(y, x)

@@ -166,7 +166,7 @@ class Proof:
         code = CATALOGUE["TF650"]
         limit = self.robot.limits.get("TF650", code.limit[0] if code.limit else 0.0)
         for judgement in ImuCheck(motion, matrix_of(pose.quat_xyzw), limit).judge():
-            if judgement.check == "yaw rate" and odometry is None:
+            if odometry is None and judgement.check in {"yaw rate", "heading"}:
                 reason = f"no odometry of {self.robot.base} came"
                 yield replace(judgement, text=reason)
                 continue
@@ -201,6 +201,7 @@ class Proof:
         new = base_from_parent.inverse() @ base_from_frame @ mount_from_frame.inverse()
         new = Pose(edge.pose.xyz, _rounded(new.quat_xyzw))
         advice = f"{describe_rotation(new.quat_xyzw)} of {mount} in {edge.parent} would fit"
+        advice += judgement.help
         edits, reason = self._edits(mount, new)
         if reason:
             notes.append(Note(f"--fix leaves it: {reason}"))

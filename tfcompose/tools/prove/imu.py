@@ -91,7 +91,15 @@ class ImuCheck:
         advice = ""
         if forward is None or forward.error_rad > _VAGUE_RAD:
             advice = "; its heading is not measured: speed up and brake while prove listens"
-        return CheckResult(check, "differs", text, "TF650", advice, rotation, values)
+        return CheckResult(
+            check,
+            "differs",
+            text,
+            code="TF650",
+            help=advice,
+            base_from_frame_xyzw=rotation,
+            values=values,
+        )
 
     def _judge_force(self, up: Estimate) -> CheckResult:
         values = {"force_m_s2": up.length}

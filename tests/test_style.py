@@ -139,14 +139,14 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
     "foundation": 1_807,
-    "model": 1_965,
-    "spec": 4_966,
-    "compiler": 10_251,
-    "tf": 5_703,
-    "guard": 4_520,
-    "launcher": 4_137,
-    "cli": 5_634,
-    "tools": 13_710,
+    "model": 1_981,
+    "spec": 5_069,
+    "compiler": 10_696,
+    "tf": 5_800,
+    "guard": 4_553,
+    "launcher": 4_143,
+    "cli": 5_755,
+    "tools": 14_393,
 }
 
 

@@ -267,7 +267,7 @@ BAD_PROFILES = (
     ("remap", "env", "names"),
     [
         ({}, {"RMW_IMPLEMENTATION": "rmw_x"}, ["rmw_fastrtps_cpp", "rmw_x"]),
-        ({"/tf": "tf"}, {}, [" tf,", "slash"]),
+        ({"/tf": "tf"}, {}, [" tf", "slash"]),
         ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"}, ["/no/such.xml", "fence: remap"]),
         ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "/dev/zero"}, ["/dev/zero", "fence: remap"]),
         *(
@@ -290,7 +290,7 @@ def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
     ]
     _, (finding,) = inspect(tmp_path, *both, fence="partition", **env)
     expect(finding, "TF902", *names)
-    assert finding.message.endswith(": slam, drive")
+    assert {"slam", "drive"} <= set(re.findall(r"\w+", finding.message))
 
 
 OWN = "FASTRTPS_DEFAULT_PROFILES_FILE"

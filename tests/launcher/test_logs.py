@@ -132,7 +132,7 @@ def test_a_log_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").touch()
     (tmp_path / "a.log").symlink_to(tmp_path / "elsewhere")
     logs = Logs(tmp_path)
-    assert "are not written" in (logs.write("a", "text") or "")
+    assert str(logs.folder) in (logs.write("a", "text") or "")
     assert (tmp_path / "elsewhere").read_text() == ""
 
 

@@ -34,6 +34,8 @@ NOT_OF_A_LINE |= {"TF726"}
 NOT_OF_A_LINE |= {"TF021", "TF022"}
 #: Of the folder of overlays: tests/cli/test_robot_overlays.py.
 NOT_OF_A_LINE |= {"TF023"}
+#: Of what is measured: tests/tools/prove.
+NOT_OF_A_LINE |= {"TF650", "TF651", "TF652"}
 #: Of what is imported: tests/tools/importers/test_shell.py.
 NOT_OF_A_LINE |= {"TF020"}
 #: Codes of the running robot, of its plan and of its surroundings.

@@ -44,7 +44,7 @@ def test_an_order_of_rotations_gives_the_quaternion_and_back_the_angles(order: s
 def test_all_orders_are_there_and_no_other() -> None:
     assert len(ORDERS) == 24
     for wrong in ("", "xyz", "sxxy", "sxy", "sxyzx", "txyz", "sxyw"):
-        with pytest.raises(ValueError, match="no order"):
+        with pytest.raises(ValueError, match="order"):
             tf.quaternion_from_euler(0, 0, 0, wrong)
 
 

@@ -34,8 +34,8 @@ def blocks(language: str, text: str = README) -> list[str]:
 
 
 def test_its_pictures_are_small_and_show_the_robot_file_of_today() -> None:
-    shown = {Path(path).name for path in re.findall(r"!\[.+?\]\((\S+)\)", README)}
-    assert shown == {file.name for file in pictures.FOLDER.iterdir()} == {"up.png", "view.png"}
+    pictured = {Path(path).name for path in re.findall(r"!\[.+?\]\((\S+)\)", README)}
+    assert pictured == {file.name for file in pictures.FOLDER.iterdir()} == {"up.png", "view.png"}
     for file in pictures.FOLDER.iterdir():
         assert file.stat().st_size <= 200_000
         with Image.open(file) as image:
@@ -51,7 +51,7 @@ def test_its_table_of_topics_is_that_of_the_code() -> None:
     assert dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", section, re.MULTILINE)) == TOPICS
 
 
-def test_every_page_is_a_topic_or_that_of_a_command_and_begins_with_its_title() -> None:
+def test_every_page_is_a_topic_or_a_command_and_starts_with_its_title() -> None:
     assert PAGES.keys() >= TOPICS.keys()
     assert PAGES.keys() <= TOPICS.keys() | COMMANDS.keys()
     for name, text in PAGES.items():
@@ -127,7 +127,7 @@ def _edges(tree: str) -> list[str]:
 
 def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
     (block,) = (block for block in blocks("console") if block.startswith("$ tfcompose lint"))
-    shown = block.removeprefix("$ tfcompose lint rover.yaml\n")
+    expected = block.removeprefix("$ tfcompose lint rover.yaml\n")
     broken = (
         blocks("yaml")[0]
         .replace("owner: base_drive", "owner: base_driv")
@@ -136,7 +136,7 @@ def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
     (rover / "rover.yaml").write_text(broken, encoding="utf-8")
     printed = run("lint", "rover.yaml", cwd=rover).stdout
     assert [line.rstrip() for line in printed.splitlines()] == [
-        line.rstrip() for line in shown.splitlines()
+        line.rstrip() for line in expected.splitlines()
     ]
 
 
@@ -234,9 +234,9 @@ def test_its_codes_are_known() -> None:
 
 def test_the_presets_that_the_pages_name_are_there() -> None:
     names = library().names
-    shown = re.search(r"^A sensor's preset is (.*)$", PAGES["presets"], re.MULTILINE)
-    assert shown
-    assert set(re.findall(r"`([a-z0-9]+/[a-z0-9-]+)`", shown[1])) <= set(names)
+    match = re.search(r"^A sensor's preset is (.*)$", PAGES["presets"], re.MULTILINE)
+    assert match
+    assert set(re.findall(r"`([a-z0-9]+/[a-z0-9-]+)`", match[1])) <= set(names)
     assert all(f"| {name.partition('/')[0]} |" in topic("presets") for name in names)
 
 

@@ -136,17 +136,32 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
     ]
 
 
+#: How many characters a test's name has at most: a name is a claim, not a paragraph.
+LONGEST_TEST_NAME = 70
+
+
+def test_no_name_of_a_test_is_longer_than_a_claim() -> None:
+    assert not [
+        f"{file.relative_to(ROOT)}:{node.lineno}: {node.name}"
+        for file in sorted((ROOT / "tests").rglob("test_*.py"))
+        for node in nodes_of(file)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and node.name.startswith("test_")
+        and len(node.name) > LONGEST_TEST_NAME
+    ]
+
+
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_807,
-    "model": 1_981,
-    "spec": 5_069,
-    "compiler": 10_696,
-    "tf": 5_800,
+    "foundation": 1_820,
+    "model": 2_030,
+    "spec": 5_110,
+    "compiler": 10_870,
+    "tf": 5_950,
     "guard": 4_553,
-    "launcher": 4_143,
-    "cli": 5_755,
-    "tools": 14_393,
+    "launcher": 4_260,
+    "cli": 5_970,
+    "tools": 19_080,
 }
 
 

@@ -93,8 +93,8 @@ def measure_all(
     failures: list[str] = []
     for name in names:
         benchmark, began = benchmark_of(name), time.monotonic()
-        (own,) = [contender for contender in benchmark.contenders if contender == TFCOMPOSE]
-        if reason := own.missing():
+        (contender,) = [contender for contender in benchmark.contenders if contender == TFCOMPOSE]
+        if reason := contender.missing():
             _say(f"{name}: left out: {reason}")
             continue
         _say(f"{name}: {benchmark.about}")

@@ -41,8 +41,8 @@ def statistic(values: Sequence[float], name: Statistic) -> float:
         return min(values)
     if name == "worst":
         return max(values)
-    found = summary(values)
-    return found.high if name == "p90" else found.median
+    quantiles = summary(values)
+    return quantiles.high if name == "p90" else quantiles.median
 
 
 def bound(limit: Limit, peers: dict[str, list[float]]) -> float:

@@ -157,7 +157,7 @@ def test_a_ratio_has_no_unit_and_a_single_run_no_spread() -> None:
     assert spread([0, 10], "s") == "5.00 s (1.00 to 9.00)"
 
 
-def test_the_table_has_a_line_for_each_peer_and_a_reason_for_one_that_is_missing() -> None:
+def test_the_table_has_a_line_per_peer_and_a_reason_for_each_missing_one() -> None:
     assert table([result()]).splitlines() == [
         "| | tfcompose | peer, in the same run | ratio |",
         "| --- | --- | --- | --- |",
@@ -225,7 +225,7 @@ def test_only_plots_load_matplotlib() -> None:
     assert processes.run(command, check=True, cwd=record.ROOT).stdout == "False\n"
 
 
-def test_each_module_of_the_suite_is_a_benchmark_of_its_name_with_tfcompose_in_it() -> None:
+def test_each_suite_module_is_a_benchmark_of_its_name_that_runs_tfcompose() -> None:
     assert len(NAMES) > 10
     for name in NAMES:
         benchmark = benchmark_of(name)

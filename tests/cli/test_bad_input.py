@@ -43,7 +43,7 @@ def everything_below(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("case", BAD)
 @pytest.mark.parametrize("command", ["lint", "build", "tree"])
-def test_a_bad_file_gives_one_finding_with_its_place_and_nothing_is_emitted(
+def test_a_bad_file_gives_one_finding_and_emits_nothing(
     case: str, command: str, folder: Path, tmp_path: Path
 ) -> None:
     data, code, (line, column), exit_code = BAD[case]
@@ -111,6 +111,16 @@ def test_wrong_use_is_exit_2_and_says_what_there_is(
     assert done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     assert everything_below(tmp_path) == before
+
+
+@pytest.mark.parametrize("words", [(), ("bag",), ("--with", "robot.yaml")])
+@pytest.mark.parametrize(("command", "bag"), [("play", "BAG"), ("rebag", "IN")])
+def test_a_missing_argument_leads_to_all_required_ones(
+    command: str, bag: str, words: tuple[str, ...], folder: Path
+) -> None:
+    done = tfcompose(command, *words, cwd=folder)
+    assert done.returncode == 2
+    assert f"tfcompose {command} {bag} --with FILE|PLAN;" in done.stderr
 
 
 def test_a_command_that_is_nearly_one_is_named(folder: Path) -> None:
@@ -242,22 +252,22 @@ def test_lint_in_json_is_a_list_of_findings_as_the_contract_has_them(folder: Pat
     )
     done = tfcompose("lint", "--format", "json", cwd=folder)
     assert done.returncode == 1
-    found = json.loads(done.stdout)
-    assert found == [
+    findings = json.loads(done.stdout)
+    assert findings == [
         {
             "code": "TF003",
             "name": "duplicate_key",
             "severity": "error",
-            "message": found[0]["message"],
+            "message": findings[0]["message"],
             "file": "robot.yaml",
             "line": 5,
             "column": 1,
             "end_line": 5,
             "end_column": 7,
-            "help": found[0]["help"],
+            "help": findings[0]["help"],
             "notes": [
                 {
-                    "message": found[0]["notes"][0]["message"],
+                    "message": findings[0]["notes"][0]["message"],
                     "file": "robot.yaml",
                     "line": 4,
                     "column": 1,
@@ -280,7 +290,7 @@ def test_lint_in_json_is_a_list_of_findings_as_the_contract_has_them(folder: Pat
     ]
 
 
-def test_lint_in_json_without_findings_is_an_empty_list_and_a_missing_file_is_a_finding(
+def test_json_lint_is_an_empty_list_if_clean_and_a_finding_if_no_file(
     folder: Path,
 ) -> None:
     (folder / "robot.yaml").write_text(GOOD)
@@ -301,6 +311,12 @@ def test_a_warning_fails_lint_only_with_strict(folder: Path) -> None:
     assert done.returncode == 0
     assert "warning[TF405]" in done.stdout
     assert tfcompose("lint", "--fail-on", "warning", cwd=folder).returncode == 1
+
+
+def test_an_unknown_frame_on_the_floor_is_named_at_its_value(folder: Path) -> None:
+    (folder / "robot.yaml").write_text(GOOD + "ground: bas_link\n")
+    head = tfcompose("lint", cwd=folder).stdout.splitlines()[0]
+    assert head.startswith("robot.yaml:4:9: error[TF203] ")
 
 
 def test_lint_shows_the_line_and_a_caret_under_the_place(folder: Path) -> None:
@@ -335,11 +351,11 @@ def test_pose_in_json_is_the_pose_of_the_second_frame_in_the_first(folder: Path)
         "json",
         cwd=folder,
     )
-    found = json.loads(done.stdout)
-    assert set(found) == {"parent", "child", "xyz", "quat_xyzw", "rpy"}
-    assert (found["parent"], found["child"]) == ("camera_link", "laser_link")
-    assert found["xyz"] == pytest.approx([-0.1, 0, 0.1])
-    assert found["quat_xyzw"] == [0, 0, 0, 1]
+    pose = json.loads(done.stdout)
+    assert set(pose) == {"parent", "child", "xyz", "quat_xyzw", "rpy"}
+    assert (pose["parent"], pose["child"]) == ("camera_link", "laser_link")
+    assert pose["xyz"] == pytest.approx([-0.1, 0, 0.1])
+    assert pose["quat_xyzw"] == [0, 0, 0, 1]
 
 
 @pytest.mark.parametrize("closed", [">&-", "<&-", "2>&-", "<&- >&- 2>&-"])

@@ -91,7 +91,7 @@ def test_up_ends_as_the_build_does(text: str | None, code: int, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("hook", ["after_in_child", "after_in_parent"])
-def test_an_interrupt_while_the_build_is_forked_ends_both_and_nothing_is_printed(
+def test_an_interrupt_during_a_forked_build_ends_both_and_prints_nothing(
     hook: str, tmp_path: Path
 ) -> None:
     """Python prints what a hook of a fork raises, and goes on."""

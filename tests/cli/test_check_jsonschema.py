@@ -81,10 +81,10 @@ def check(*files: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_example_robots_and_presets_of_ones_own_pass(tmp_path: Path) -> None:
-    own = tmp_path / "own.yaml"
+    own_file = tmp_path / "own.yaml"
     preset = "sensors: {c: {preset: realsense/mine, parent: base_link, options: {any: 1}}}\n"
-    own.write_text(f"{HEAD}{LINKS}preset_path: [presets]\n{preset}", encoding="utf-8")
-    done = check(*ROBOTS, own)
+    own_file.write_text(f"{HEAD}{LINKS}preset_path: [presets]\n{preset}", encoding="utf-8")
+    done = check(*ROBOTS, own_file)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -85,7 +85,7 @@ def test_the_projects_own_address_is_the_default(monkeypatch: pytest.MonkeyPatch
     assert LINK in printed(Terminal())
 
 
-def test_there_are_no_links_into_a_pipe_or_where_the_terminal_is_to_be_plain(
+def test_a_pipe_or_a_plain_terminal_gets_no_links(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert "\033]8" not in printed(io.StringIO())

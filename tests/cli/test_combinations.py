@@ -28,9 +28,9 @@ def test_beyond_that_each_two_values_are_together_in_one(count: int, values: int
     alternatives = {f"a{i}": tuple(f"v{j}" for j in range(values)) for i in range(count)}
     every = combinations(alternatives, dict.fromkeys(alternatives, "v0"))
     assert len(every) <= MOST < values**count
-    for subset, other in subsets(alternatives, 2):
-        assert {(row[subset], row[other]) for row in every} == set(
-            product(alternatives[subset], alternatives[other])
+    for first, second in subsets(alternatives, 2):
+        assert {(row[first], row[second]) for row in every} == set(
+            product(alternatives[first], alternatives[second])
         )
 
 
@@ -83,8 +83,8 @@ def test_lint_and_the_other_commands_take_arguments(tmp_path: Path) -> None:
     words = ("build", "sim:=true", file, "--set", "args.lidar=b", "-o", tmp_path / "out")
     assert "TF203" in tfcompose(*words, code=1).stderr
     assert "TF106" in tfcompose("tree", file, "lidar:=c", code=1).stderr
-    shown = tfcompose("up", file, "--show-args").stdout
-    assert [line.partition(":=")[0] for line in shown.splitlines()] == ["sim", "lidar"]
+    listing = tfcompose("up", file, "--show-args").stdout
+    assert [line.partition(":=")[0] for line in listing.splitlines()] == ["sim", "lidar"]
 
 
 def test_lint_judges_an_integer_at_its_bounds_and_its_default(tmp_path: Path) -> None:

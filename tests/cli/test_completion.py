@@ -186,7 +186,7 @@ def test_a_shell_on_a_terminal_completes_words_at_the_tab_key(name: str, folder:
             shell.shows(f"{PROMPT}{typed.rpartition(' ')[0]} {completed}#")
         shell.type("\x15\x0ctfcompose up cell.yaml --timeout \t#")
         shell.shows("--timeout #")
-        assert "my robot.yaml" not in shell.shown
+        assert "my robot.yaml" not in shell.screen_text
         assert shell.text.count("command not found") == 0
     finally:
         shell.close()

@@ -99,7 +99,7 @@ def ps(tfc: Callable[..., Any]) -> dict[str, dict[str, Any]]:
     return {process["name"]: process for process in robot["processes"]}
 
 
-def test_what_is_missing_when_the_time_is_over_is_reported_with_1_and_the_robot_goes_on(
+def test_a_timeout_reports_missing_edges_with_1_and_the_robot_goes_on(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     (tmp_path / "robot.yaml").write_text(EXTERNAL)
@@ -113,7 +113,7 @@ def test_what_is_missing_when_the_time_is_over_is_reported_with_1_and_the_robot_
     assert ps(tfc)["static"]["state"] == "running"
 
 
-def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobody(
+def test_one_process_restarts_stops_and_starts_and_the_guard_blames_none(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     """The edge may be silent for 4 s, so that a machine that stalls blames nobody.
@@ -149,7 +149,7 @@ def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobod
     assert " drive?" in tfc("restart", "driv").stderr
 
 
-def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_keep(
+def test_up_restarts_what_changed_and_reports_what_listeners_keep(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     nothing = tfc("up", "--update")
@@ -195,16 +195,16 @@ def test_events_are_reported_from_the_start_and_wait_returns_the_exit_code(
     kinds = [event["event"] for event in events]
     assert kinds[0] == "ProcessState"
     assert kinds[-1] == "Ended"
-    found = [event["found"] for event in events if event["event"] == "FindingShown"]
-    (found,) = [entry for entry in found if entry["code"] not in LATE]
-    assert (found["code"], found["message"].split()[0], found["message"].split()[-1]) == (
+    reported = [event["found"] for event in events if event["event"] == "FindingShown"]
+    (finding,) = [entry for entry in reported if entry["code"] not in LATE]
+    assert (finding["code"], finding["message"].split()[0], finding["message"].split()[-1]) == (
         "TF808",
         "static",
         "SIGKILL",
     )
 
 
-def test_a_killed_launcher_ends_events_with_1_leaves_no_process_and_is_not_in_the_way(
+def test_a_killed_launcher_ends_events_with_1_and_leaves_no_process(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     assert tfc("up", "--wait").returncode == 0
@@ -225,7 +225,7 @@ def test_a_killed_launcher_ends_events_with_1_leaves_no_process_and_is_not_in_th
     assert tfc("up", "--wait").returncode == 0
 
 
-def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(
+def test_a_suspended_launcher_is_named_at_once_and_hides_no_other_robot(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     (tmp_path / "other.yaml").write_text(
@@ -269,7 +269,7 @@ def test_a_robot_in_the_background_is_listed_with_states_memory_and_edges() -> N
 
 
 @of_one_robot
-def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
+def test_a_run_with_another_runtime_folder_is_found_and_is_no_leftover(
     background: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as elsewhere:
@@ -302,7 +302,7 @@ def test_who_follows_ends_when_nobody_reads_it_any_more() -> None:
 
 @of_one_robot
 @pytest.mark.usefixtures("background")
-def test_what_waits_for_a_stopped_process_is_reported_to_wait_by_ps_and_by_who_starts_it() -> None:
+def test_ps_and_start_report_what_waits_for_a_stopped_process() -> None:
     assert run("restart", "late").stdout == "late: restarting\n"
     assert run("stop", "drive").returncode == 0
     assert until(lambda: ps(run)["drive"]["state"] == "stopped")

@@ -61,7 +61,7 @@ def test_names_of_any_length_align_also_of_processes_that_are_new() -> None:
     assert len({line.index("|") for line in output.text.splitlines()}) == 1
 
 
-def test_a_tree_on_a_terminal_has_each_frame_in_its_place_and_does_not_wrap(
+def test_a_tree_on_a_terminal_shows_each_frame_in_place_and_does_not_wrap(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     full = tfcompose_in(ROBOTS, "tree", "autonomous_robot.yaml").stdout.splitlines()
@@ -75,7 +75,7 @@ def test_a_tree_on_a_terminal_has_each_frame_in_its_place_and_does_not_wrap(
     assert fitted_names == names
 
 
-def test_a_process_writes_to_the_terminal_or_into_its_log_as_its_output_says() -> None:
+def test_a_process_writes_to_the_terminal_or_its_log_as_output_says() -> None:
     outputs: tuple[OutputPlace, ...] = ("both", "log", "screen")
     processes = tuple(PlanProcess(f"to_{place}", "run", output=place) for place in outputs)
     output, kept = Printed(), dict[str, str]()

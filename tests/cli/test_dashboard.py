@@ -116,7 +116,7 @@ def dashboard(count: int = 3, edges: int = 2, **changes: object) -> Dashboard:
     )
 
 
-def shown(view: Dashboard, columns: int = 80, rows: int = 24) -> str:
+def screen_text(view: Dashboard, columns: int = 80, rows: int = 24) -> str:
     return "\n".join(line.plain for line in view.lines(columns, rows))
 
 
@@ -144,7 +144,7 @@ def test_each_page_fills_a_terminal_of_any_size_and_no_line_is_wider(page: Page)
 
 
 def test_numbers_are_not_shortened_at_80_columns() -> None:
-    text = shown(dashboard(50))
+    text = screen_text(dashboard(50))
     assert "1:02 h" in text
     assert all(f"  {100 + number}  " in text for number in range(10))
     assert "2/2" in text
@@ -153,7 +153,7 @@ def test_numbers_are_not_shortened_at_80_columns() -> None:
 def test_when_all_is_well_one_line_shows_it_and_events_are_below() -> None:
     view = dashboard()
     view.take(OwnerLive("drive", "/drive", ("frame_0 → frame_1",), 0.5), NOON)
-    head, *rest = shown(view).splitlines()
+    head, *rest = screen_text(view).splitlines()
     assert "all well" in head
     assert "3/3 processes" in head
     assert "2/2 edges live" in head
@@ -161,11 +161,11 @@ def test_when_all_is_well_one_line_shows_it_and_events_are_below() -> None:
     assert any("live  drive (/drive)" in line for line in rest)
 
 
-def test_a_finding_is_on_the_first_page_at_once_and_with_its_help_on_its_own() -> None:
+def test_a_finding_is_on_the_first_page_and_its_help_on_its_own_page() -> None:
     view = dashboard()
     view.take(OwnerLive("drive", "/drive", ("frame_0 → frame_1",), 0.5), NOON)
     view.take(FindingShown(TAKEN), NOON)
-    text = shown(view)
+    text = screen_text(view)
     assert "TF801" in text
     assert "1 error" in text.splitlines()[0]
     assert "all well" not in text
@@ -174,7 +174,7 @@ def test_a_finding_is_on_the_first_page_at_once_and_with_its_help_on_its_own() -
     assert {"TF801", "pid 77", "end it", "has ended"} <= {
         word
         for word in ("TF801", "pid 77", "end it", "has ended")
-        if word in shown(open_page(view, "findings"))
+        if word in screen_text(open_page(view, "findings"))
     }
 
 
@@ -182,7 +182,7 @@ def test_edges_that_are_not_live_come_first() -> None:
     view = dashboard(
         3, 40, missing=("frame_30 → frame_31",), silent=("frame_35 → frame_36",), complete=False
     )
-    lines = shown(open_page(view, "edges")).splitlines()[2:4]
+    lines = screen_text(open_page(view, "edges")).splitlines()[2:4]
     assert ["not live" in lines[0], "silent" in lines[1]] == [True, True]
     assert "frame_30" in lines[0]
     assert "frame_35" in lines[1]
@@ -191,7 +191,7 @@ def test_edges_that_are_not_live_come_first() -> None:
 def test_a_robot_is_ended_by_q_twice_on_the_first_page_alone() -> None:
     view = dashboard()
     assert not view.press("q")
-    assert "rover@0" in shown(view).splitlines()[-1]
+    assert "rover@0" in screen_text(view).splitlines()[-1]
     assert not view.press("down")
     assert not view.press("q")
     assert view.press("q")
@@ -223,36 +223,38 @@ def test_the_chosen_process_is_in_view_among_fifty() -> None:
     view = dashboard(50)
     for _ in range(60):
         view.press("down")
-    assert "▸" in shown(view)
-    assert "process_49" in shown(view)
+    assert "▸" in screen_text(view)
+    assert "process_49" in screen_text(view)
     view.press("home")
-    assert "drive" in shown(view)
-    assert "process_49" not in shown(view)
+    assert "drive" in screen_text(view)
+    assert "process_49" not in screen_text(view)
 
 
 def test_a_log_follows_its_end_and_stays_in_place_once_it_is_scrolled() -> None:
     view = open_page(dashboard(), "log")
     view.add_log_lines(f"line {number}" for number in range(100))
-    assert "line 99" in shown(view)
+    assert "line 99" in screen_text(view)
     view.press("pgup")
-    before = shown(view).splitlines()[2:-1]
+    before = screen_text(view).splitlines()[2:-1]
     view.add_log_lines(f"line {number}" for number in range(100, 150))
-    assert shown(view).splitlines()[2:-1] == before
+    assert screen_text(view).splitlines()[2:-1] == before
     view.press("end")
-    assert "line 149" in shown(view)
+    assert "line 149" in screen_text(view)
 
 
 def test_what_a_process_prints_cannot_control_the_terminal() -> None:
     view = open_page(dashboard(), "log")
     view.add_log_lines(["\033[2J\033[31mred\033]0;title\a \b\x9b2J end", "a\tb"])
-    text = shown(view)
+    text = screen_text(view)
     assert "red" in text
     assert "title" not in text
     assert all(char.isprintable() or char == "\n" for char in text)
     view.take(FindingShown(replace(TAKEN, message="\033[2J", help="\x9b2J")), NOON)
     view.take(Stopping("\033[2J"), NOON)
     for page in PAGES:
-        assert all(char.isprintable() or char == "\n" for char in shown(open_page(view, page)))
+        assert all(
+            char.isprintable() or char == "\n" for char in screen_text(open_page(view, page))
+        )
 
 
 def test_a_flood_is_kept_within_bounds() -> None:
@@ -266,7 +268,7 @@ def test_the_end_is_remembered() -> None:
     view = dashboard()
     view.take(Stopping("SIGINT"), NOON)
     view.take(Ended(0), NOON)
-    assert "stopping: SIGINT" in shown(view)
+    assert "stopping: SIGINT" in screen_text(view)
     assert view.ended == Ended(0)
 
 
@@ -310,19 +312,17 @@ def test_keys_are_known_in_pieces_and_in_the_forms_that_terminals_send() -> None
     assert keys.feed("ö".encode()) == ["ö"]
 
 
-def test_what_was_printed_before_the_view_is_among_its_events_after_each_connection() -> None:
+def test_events_printed_before_the_view_appear_after_each_connection() -> None:
     plan = Plan("rover", "", None, RosSettings(), (), ())
     view = Dashboard(
         "rover@0", plan, (), ["an earlier run left 77 behind\033[2J"], clock=lambda: NOON
     )
-    assert "WARNING an earlier run left 77 behind" in shown(view)
+    assert "WARNING an earlier run left 77 behind" in screen_text(view)
     view.forget()
-    assert shown(view).count("an earlier run left 77 behind") == 1
+    assert screen_text(view).count("an earlier run left 77 behind") == 1
 
 
-def test_what_the_build_found_is_among_the_findings_also_after_the_connection_is_made_again() -> (
-    None
-):
+def test_findings_of_the_build_remain_after_a_reconnect() -> None:
     view = dashboard()
     view = Dashboard(
         "rover@0",
@@ -331,7 +331,7 @@ def test_what_the_build_found_is_among_the_findings_also_after_the_connection_is
         clock=lambda: NOON,
     )
     for _ in range(2):
-        assert "1 warning" in shown(view).splitlines()[0]
-        assert "TF508" in shown(view)
+        assert "1 warning" in screen_text(view).splitlines()[0]
+        assert "TF508" in screen_text(view)
         view.forget()
-    assert "pid 77" in shown(open_page(view, "findings"))
+    assert "pid 77" in screen_text(open_page(view, "findings"))

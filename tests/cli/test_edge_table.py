@@ -22,9 +22,9 @@ def observer() -> TreeObserver:
     fixed = [Publisher(gid, "/static", static=True) for gid in (b"2", b"3")]
     observed.take_graph([Publisher(b"1", "/front/diff_drive_controller", static=False), *fixed])
     for tenth in range(10, 40):
-        at = tenth * SECOND // 10
-        rows = [row("front/odom", "front/base_footprint", at - 2_000_000)]
-        observed.take(rows, static=False, gid=b"1", received_ns=at)  # type: ignore[arg-type]
+        sent_ns = tenth * SECOND // 10
+        rows = [row("front/odom", "front/base_footprint", sent_ns - 2_000_000)]
+        observed.take(rows, static=False, gid=b"1", received_ns=sent_ns)  # type: ignore[arg-type]
     observed.take([row("base", "lidar", 0)], static=True, gid=b"2", received_ns=0)  # type: ignore[list-item]
     return observed
 

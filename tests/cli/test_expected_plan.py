@@ -20,16 +20,16 @@ ROBOT = Path(__file__).parents[2] / "robots" / "my_robot.yaml"
 @pytest.fixture
 def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan | None]:
     """Have the doctor look at nothing; the plan that it would have judged by comes here."""
-    known: list[Plan | None] = []
+    compiled: list[Plan | None] = []
 
     def plan(
         arguments: Namespace, real: Callable[[Namespace], Plan | None] = doctor._plan
     ) -> NoReturn:
-        known.append(real(arguments))
+        compiled.append(real(arguments))
         raise SystemExit(77)
 
     monkeypatch.setattr(doctor, "_plan", plan)
-    return known
+    return compiled
 
 
 @pytest.mark.ros

@@ -19,7 +19,7 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("kind", ["systemd", "compose", "launch"])
-def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_complete(
+def test_a_robot_and_its_plan_export_alike_and_the_build_stays_complete(
     robot: Path, kind: str
 ) -> None:
     assert main(["build"]) == 0
@@ -67,6 +67,30 @@ def test_a_hosts_share_is_exported_without_the_others(
     assert " jetson?" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("kind", "options", "file"),
+    [
+        ("compose", [], "compose.yaml"),
+        ("launch", [], "rover.launch.py"),
+        ("launch", ["--format", "xml"], "rover.launch.xml"),
+        ("launch", ["--format", "yaml"], "rover.launch.yaml"),
+    ],
+)
+def test_the_plans_folder_on_the_robot_is_that_of_at(
+    kind: str, options: list[str], file: str, robot: Path
+) -> None:
+    (robot / "robot.yaml").write_text(DRIVEN.replace("    lifecycle: active\n", ""), "utf-8")
+
+    def export(*at_options: str) -> str:
+        assert main(["export", kind, *options, *at_options]) == 0
+        return (robot / "build" / "rover" / kind / file).read_text("utf-8")
+
+    assert "/opt/rover" not in export()
+    text = export("--at", "/opt/rover")
+    assert "/opt/rover" in text
+    assert not any(folder in text for folder in ("dirname", "'..'", ": .."))
+
+
 def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
     words = [
         "--at",
@@ -87,7 +111,7 @@ def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
 STRICT = ["--set", "guard.mode=strict"]
 
 
-def test_units_of_a_declared_host_have_its_python_and_setup_unless_others_are_given(
+def test_units_use_the_python_and_setup_of_their_host_unless_overridden(
     robot: Path,
 ) -> None:
     declared = "hosts: {jetson: {python: /opt/py, setup: [/opt/a.bash, /opt/b.bash]}, main: {}}\n"
@@ -112,7 +136,7 @@ def test_a_strict_plan_has_no_launch_file_because_there_is_no_guard_in_it(
     assert not (robot / "build" / "rover" / "launch").exists()
 
 
-def test_a_strict_plan_is_exported_where_a_guard_runs_and_every_owner_can_be_fenced_off(
+def test_a_strict_plan_exports_if_a_guard_runs_and_can_fence_each_owner(
     robot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", "compose", *STRICT]) == 0

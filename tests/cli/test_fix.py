@@ -293,9 +293,9 @@ def test_an_edit_that_takes_nothing_away_is_not_kept(tmp_path: Path) -> None:
 
 
 def test_edits_that_meet_are_none() -> None:
-    first, other = Edit(Span("r", 1, 1, 1, 4), "x"), Edit(Span("r", 1, 3, 1, 6), "y")
+    first, second = Edit(Span("r", 1, 1, 1, 4), "x"), Edit(Span("r", 1, 3, 1, 6), "y")
     assert apply_edits("abcdefg", [first]) == "xdefg"
-    assert apply_edits("abcdefg", [first, other]) is None
+    assert apply_edits("abcdefg", [first, second]) is None
     assert apply_edits("abcdefg", [Edit(Span("r", 3, 1, 3, 1), "y")]) is None
 
 
@@ -318,14 +318,16 @@ def slipped(draw: st.DrawFn) -> str:
             if text[match.end() : match.end() + 1] in ":,]}"
         ]
         begin, end = draw(st.sampled_from(words)).span()
-        at, char = draw(st.integers(begin, end - 1)), draw(st.sampled_from("aexyz"))
-        text = draw(st.sampled_from([text[:at] + text[at + 1 :], text[:at] + char + text[at:]]))
+        index, char = draw(st.integers(begin, end - 1)), draw(st.sampled_from("aexyz"))
+        text = draw(
+            st.sampled_from([text[:index] + text[index + 1 :], text[:index] + char + text[index:]])
+        )
     return text
 
 
 @given(slipped() | st.sampled_from([HEAD + before for before, _ in EXAMPLES.values()]))
 @settings(max_examples=50, deadline=None)
-def test_the_second_time_there_is_nothing_to_fix_and_the_first_time_brings_nothing_new(
+def test_a_fix_brings_no_new_finding_and_a_second_fix_changes_nothing(
     text: str,
 ) -> None:
     def read(_: str) -> str:

@@ -28,7 +28,7 @@ with open_node("stranger", "", args=["-r", f"/tf:={topic}"]) as node:
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_offence(
+def test_each_rover_uses_its_own_topics_and_foreign_edges_are_an_offence(
     start: Callable[..., Any], domain: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "stranger.py").write_text(STRANGER, encoding="utf-8")

@@ -22,9 +22,9 @@ def tfcompose(*words: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_lint_finds_nothing_in_an_example_with_any_profile(robot: str) -> None:
-    found = tfcompose("lint", "--fail-on", "warning", f"robots/{robot}")
-    assert found.returncode == 0, found.stdout
-    assert len(found.stdout.splitlines()) == 1
+    done = tfcompose("lint", "--fail-on", "warning", f"robots/{robot}")
+    assert done.returncode == 0, done.stdout
+    assert len(done.stdout.splitlines()) == 1
 
 
 @pytest.mark.parametrize("robot", WITH_DEMO)

@@ -83,7 +83,7 @@ with open_node("arm_drive", "/", args=sys.argv[2:]) as node:
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_all(
+def test_two_strict_guards_each_filter_their_machine_and_pass_on_to_all(
     start: Callable[..., Started], tmp_path: Path
 ) -> None:
     (tmp_path / "liar.py").write_text(LIAR, "utf-8")
@@ -129,7 +129,7 @@ def test_a_share_that_is_live_on_another_machine_is_refused(
     up = start("up", file, "-o", tmp_path / "b", "--settle", 10)
     assert up.process.wait(60) == 1
     up.until_says("ended with exit code 1")
-    (found,) = [line for line in up.output.splitlines() if "error[TF807]" in line]
-    assert all(name in found for name in ("odom → base_link", "another /drive"))
+    (line,) = [line for line in up.output.splitlines() if "error[TF807]" in line]
+    assert all(name in line for name in ("odom → base_link", "another /drive"))
     assert "started static" not in up.output
     assert elsewhere.end() == 0

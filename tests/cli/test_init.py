@@ -44,8 +44,10 @@ def test_profile_sim_starts_what_takes_the_simulators_place_with_its_clock(
 
 
 def test_every_template_is_listed_and_no_file_is_left_out() -> None:
-    others = {other.removesuffix(".yaml") for _, more in TEMPLATES.values() for other in more}
-    assert {file.stem for file in FOLDER.glob("*.yaml")} == TEMPLATES.keys() | others
+    further_files = {
+        file_name.removesuffix(".yaml") for _, more in TEMPLATES.values() for file_name in more
+    }
+    assert {file.stem for file in FOLDER.glob("*.yaml")} == TEMPLATES.keys() | further_files
 
 
 @pytest.mark.ros
@@ -75,13 +77,13 @@ def test_the_command_that_it_names_starts_the_robot(
         robot.close()
 
 
-@pytest.mark.parametrize("there", ["robot.yaml", "cart.yaml", "robot.schema.json"])
-def test_nothing_is_replaced_and_all_or_nothing_is_made(there: str, tmp_path: Path) -> None:
-    (tmp_path / there).write_text("mine", "utf-8")
+@pytest.mark.parametrize("existing", ["robot.yaml", "cart.yaml", "robot.schema.json"])
+def test_nothing_is_replaced_and_all_or_nothing_is_made(existing: str, tmp_path: Path) -> None:
+    (tmp_path / existing).write_text("mine", "utf-8")
     done = tfcompose_in(tmp_path, "init", "fleet", "--schema")
-    assert (done.returncode, there in done.stderr) == (2, True)
-    assert [file.name for file in tmp_path.iterdir()] == [there]
-    assert (tmp_path / there).read_text("utf-8") == "mine"
+    assert (done.returncode, existing in done.stderr) == (2, True)
+    assert [file.name for file in tmp_path.iterdir()] == [existing]
+    assert (tmp_path / existing).read_text("utf-8") == "mine"
 
 
 @pytest.mark.parametrize("name", ["3x", "a b", "", "ä", "a/b"])

@@ -20,11 +20,11 @@ def test_a_folder_stands_for_the_robot_files_below_it(tmp_path: Path) -> None:
     (tmp_path / "params.yaml").write_text(
         "node: {ros__parameters: {tfcompose: 1}}\n", encoding="utf-8"
     )
-    found = [file.removeprefix(f"{tmp_path}/") for file in robots_in(str(tmp_path))]
-    assert found == ["a.yml", "b/robot.yaml", "b/c/d.yaml"]
+    files = [file.removeprefix(f"{tmp_path}/") for file in robots_in(str(tmp_path))]
+    assert files == ["a.yml", "b/robot.yaml", "b/c/d.yaml"]
 
 
-def test_a_robot_whose_first_key_is_misspelt_and_a_file_that_cannot_be_read_are_not_left_out(
+def test_a_misspelt_first_key_or_an_unreadable_file_is_not_left_out(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "a.yaml").write_text(ROBOT.replace("tfcompose", "tfcompos"), encoding="utf-8")
@@ -48,7 +48,7 @@ def test_what_is_larger_than_a_robot_can_be_is_none(tmp_path: Path) -> None:
     assert robots_in(str(tmp_path)) == [str(tmp_path / "robot.yaml")]
 
 
-def test_other_file_systems_and_what_the_kernel_shows_as_files_are_not_searched(
+def test_lint_searches_no_other_file_system_and_no_kernel_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("here", "mounted", "proc"):
@@ -58,9 +58,9 @@ def test_other_file_systems_and_what_the_kernel_shows_as_files_are_not_searched(
 
     def stat(path: str) -> os.stat_result:
         """Return what is there, the folder ``mounted`` being another file system."""
-        found = list(real(path))
-        found[2] += path.endswith("mounted")
-        return os.stat_result(found)
+        fields = list(real(path))
+        fields[2] += path.endswith("mounted")
+        return os.stat_result(fields)
 
     monkeypatch.setattr("tfcompose.cli.robot_search._OF_KERNEL", {str(tmp_path / "proc")})
     monkeypatch.setattr("tfcompose.cli.robot_search.os.stat", stat)

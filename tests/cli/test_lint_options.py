@@ -141,6 +141,11 @@ def test_watch_lints_again_when_a_file_changes(folder: Path) -> None:
     assert until(lambda: watch.output.count("watching") == 2)
     (folder / "new.yaml").write_text(WRONG.replace("robot: r", "robot: s"), "utf-8")
     assert until(lambda: "new.yaml:6:42" in watch.output)
+    (folder / "units").mkdir()
+    (folder / "new.yaml").write_text(WARNED + "overlays: {by: hostname, folder: units}\n", "utf-8")
+    assert until(lambda: watch.output.count("watching") == 4)
+    (folder / "units/ant.yaml").write_text("frames: {mast: {xyz: 1}}\n", "utf-8")
+    assert until(lambda: "units/ant.yaml:1:22" in watch.output)
     watch.process.send_signal(2)
     assert watch.process.wait(TIMEOUT_S) == 130
 

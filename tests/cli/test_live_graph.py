@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tfcompose.cli import main
-from tfcompose.cli.commands.graph import graph_of_observers
+from tfcompose.cli.tree_picture import graph_of_observers
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.plan import Plan, PlanEdge, RosSettings, SourceLine
 from tfcompose.tf.live.edges import TreeObserver
@@ -69,7 +69,7 @@ def test_poses_stand_below_and_a_rotation_that_is_none_is_reported(observer: Tre
     assert arrows["mast", "lidar"].pose == "no rotation"
 
 
-def test_what_the_plan_expects_and_nobody_publishes_is_reported_to_be_missing(
+def test_an_expected_edge_without_a_publisher_is_reported_missing(
     observer: TreeObserver,
 ) -> None:
     edges = (

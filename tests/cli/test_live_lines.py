@@ -31,7 +31,7 @@ class Terminal:
             self.stream.fileno(), termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0)
         )
 
-    def shown(self) -> str:
+    def take_output(self) -> str:
         """Return what was written since the last time.
 
         It may come in pieces, so an end is written after it.
@@ -61,13 +61,13 @@ def test_a_drawing_sends_the_lines_that_changed_and_what_was_below_it_goes(
 ) -> None:
     lines = LiveLines(terminal.stream)
     lines.draw(["one", "two", "three"])
-    assert terminal.shown() == "\r\033[Kone\n\r\033[Ktwo\n\r\033[Kthree\n"
+    assert terminal.take_output() == "\r\033[Kone\n\r\033[Ktwo\n\r\033[Kthree\n"
     lines.draw(["one", "2", "three"])
-    assert terminal.shown() == "\033[3A\n\r\033[K2\n\n"
+    assert terminal.take_output() == "\033[3A\n\r\033[K2\n\n"
     lines.draw(["one", "2", "three"])
-    assert not terminal.shown()
+    assert not terminal.take_output()
     lines.draw(["four"])
-    assert terminal.shown() == "\033[3A\r\033[Kfour\n\r\033[K\n\033[J\033[A"
+    assert terminal.take_output() == "\033[3A\r\033[Kfour\n\r\033[K\n\033[J\033[A"
 
 
 ROWS = st.lists(st.sampled_from(["", "a", "\033[31mred\033[0m", "x" * 20]), min_size=1, max_size=6)
@@ -79,16 +79,16 @@ def test_a_terminal_shows_the_rows_of_the_last_drawing(drawings: list[list[str]]
     stream, rows = pyte.Stream(screen), Rows()
     for drawing in drawings:
         stream.feed(rows.change(drawing).replace("\n", "\r\n"))
-        shown = [line.rstrip() for line in screen.display]
-        assert shown == [*map(plain, drawing), *[""] * (6 - len(drawing))]
+        screen_rows = [line.rstrip() for line in screen.display]
+        assert screen_rows == [*map(plain, drawing), *[""] * (6 - len(drawing))]
         assert screen.cursor.y == len(drawing) - 1
 
 
-def test_no_line_is_longer_than_the_terminal_and_there_are_no_more_than_it_shows(
+def test_the_lines_fit_the_width_and_the_height_of_the_terminal(
     terminal: Terminal,
 ) -> None:
     LiveLines(terminal.stream).draw(["x" * 100, *map(str, range(50))])
-    lines = terminal.shown().replace("\r\033[K", "").split("\n")
+    lines = terminal.take_output().replace("\r\033[K", "").split("\n")
     assert lines[0] == "x" * 38 + "…"
     assert (lines[8][:9], lines[8][38:]) == ("… 43 more", "…")
     assert len(lines) == 10
@@ -98,10 +98,10 @@ def test_after_the_window_shrank_the_screen_is_drawn_anew(terminal: Terminal) ->
     """Lines that were drawn have wrapped, so that nobody knows how many there are."""
     lines = LiveLines(terminal.stream)
     lines.draw(["x" * 30])
-    terminal.shown()
+    terminal.take_output()
     terminal.resize(20, 10)
     lines.draw(["y" * 30])
-    assert terminal.shown() == "\033[H\033[2J\r\033[K" + "y" * 18 + "…\n"
+    assert terminal.take_output() == "\033[H\033[2J\r\033[K" + "y" * 18 + "…\n"
 
 
 def test_a_terminal_that_cannot_move_its_cursor_and_a_pipe_get_plain_lines(

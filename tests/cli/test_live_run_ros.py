@@ -43,7 +43,7 @@ def shell(domain: object, tmp_path: Path) -> Iterator[Shell]:
     made.close()
 
 
-def test_it_shows_the_robot_and_its_logs_and_ctrl_c_ends_it_and_puts_the_terminal_back(
+def test_ctrl_c_ends_the_robot_and_restores_the_terminal(
     shell: Shell,
 ) -> None:
     shell.up()
@@ -57,7 +57,9 @@ def test_it_shows_the_robot_and_its_logs_and_ctrl_c_ends_it_and_puts_the_termina
     shell.shows("log of talker", "speaks")
     for columns, rows in ((200, 60), (40, 8), (80, 24)):
         shell.resize(columns, rows)
-        assert until(lambda: "speaks" in shell.shown and "Esc back" in shell.screen.display[-1])
+        assert until(
+            lambda: "speaks" in shell.screen_text and "Esc back" in shell.screen.display[-1]
+        )
     shell.type("\003")
     shell.shows("ended", PROMPT)
     assert until(lambda: all(map(gone, started)))
@@ -134,7 +136,7 @@ def test_ctrl_s_stops_neither_the_view_nor_its_end(shell: Shell) -> None:
     shell.shows("ended", PROMPT)
 
 
-def test_a_terminal_that_takes_nothing_keeps_neither_the_view_nor_the_robot_from_ending(
+def test_a_blocked_terminal_keeps_neither_view_nor_robot_from_ending(
     shell: Shell,
 ) -> None:
     shell.up()
@@ -151,7 +153,7 @@ def test_a_terminal_that_takes_nothing_keeps_neither_the_view_nor_the_robot_from
     shell.shows(PROMPT)
 
 
-def test_what_the_build_found_is_shown_in_the_view_and_without_colours_there_are_none(
+def test_the_view_shows_findings_of_the_build_and_obeys_no_color(
     domain: object, tmp_path: Path
 ) -> None:
     assert domain

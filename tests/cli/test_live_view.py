@@ -124,9 +124,7 @@ def test_violations_come_first_and_are_counted() -> None:
 
 @pytest.mark.parametrize("columns", [8, 20, 30, 44, 60, 80, 200])
 @pytest.mark.parametrize("count", [1, 200])
-def test_the_line_is_one_line_on_every_terminal_and_leaves_room_for_what_ctrl_c_writes(
-    columns: int, count: int
-) -> None:
+def test_the_status_is_one_line_and_leaves_room_for_ctrl_c(columns: int, count: int) -> None:
     names = [f"a_process_with_a_long_name_{number}" for number in range(count)]
     view = View(plan_of(*names, owner=names[0]), columns)
     view.tell(*running(*names))
@@ -254,7 +252,7 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
         os.kill(started.pid, signal.SIGKILL)
 
 
-def test_on_a_real_terminal_the_log_is_complete_the_line_below_it_and_ctrl_c_leaves_nothing(
+def test_a_real_terminal_has_the_full_log_and_ctrl_c_leaves_nothing(
     terminal: Terminal,
 ) -> None:
     assert terminal.shows("41 of 41 processes")

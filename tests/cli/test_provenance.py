@@ -113,11 +113,11 @@ def test_a_finding_about_a_replaced_value_names_what_it_replaced(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     main(["lint", robot, "--profile", profile, "--format", "json"])
-    found = {
+    notes_by_line = {
         f"{entry['code']} {entry['file']}:{entry['line']}:{entry['column']}": entry["notes"]
         for entry in json.loads(capsys.readouterr().out)
     }
-    (note,) = found[found_at]
+    (note,) = notes_by_line[found_at]
     assert f"{note['file']}:{note['line']}:{note['column']}" == replaced[0]
     assert all(name in note["message"] for name in replaced[1:])
 
@@ -135,10 +135,7 @@ def test_a_finding_about_what_nothing_replaced_has_no_such_note(
     robot: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     main(["lint", robot, "--profile", "far", "--format", "json"])
-    others = [entry for entry in json.loads(capsys.readouterr().out) if entry["code"] != "TF414"]
+    entries = [entry for entry in json.loads(capsys.readouterr().out) if entry["code"] != "TF414"]
     assert not [
-        note
-        for other_process in others
-        for note in other_process["notes"]
-        if "replaces" in note["message"]
+        note for entry in entries for note in entry["notes"] if "replaces" in note["message"]
     ]

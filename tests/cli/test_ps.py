@@ -17,6 +17,17 @@ WARNING = finding("TF861", "/rogue sends arm_jiont", None)
 FAILED = replace(SOUND, processes=(process("camera", "fatal", failed=True),))
 
 
+def test_the_overlays_are_in_the_table_and_in_json(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = replace(SOUND, overlays=("overlays/ant.yaml",))
+    monkeypatch.setattr(ps, "_robots", lambda _: ({"rover@0": status}, 0))
+    assert main(["ps"]) == 0
+    assert "overlays/ant.yaml" in capsys.readouterr().out
+    assert main(["ps", "--format", "json"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["overlays"] == ["overlays/ant.yaml"]
+
+
 @pytest.mark.parametrize(
     ("status", "codes"),
     [
@@ -39,8 +50,8 @@ def test_scripts_choose_what_makes_the_exit_code(
         ["--fail-on", "error"],
     )
     for format_ in ("text", "json"):
-        found = tuple(main(["ps", "--format", format_, *words]) for words in options)
-        assert found == codes
+        exit_codes = tuple(main(["ps", "--format", format_, *words]) for words in options)
+        assert exit_codes == codes
 
 
 def test_findings_are_listed_and_in_the_json(

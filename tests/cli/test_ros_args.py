@@ -35,32 +35,34 @@ def processes_of(folder: Path, isolate: str, *ros_args: str) -> tuple[dict[str, 
 def test_a_namespace_is_above_nodes_and_isolated_topics_and_in_no_frame(
     tmp_path: Path, isolate: str, frame: str
 ) -> None:
-    found, frames = processes_of(tmp_path, isolate, "-r", "__ns:=/outer")
+    processes, frames = processes_of(tmp_path, isolate, "-r", "__ns:=/outer")
     assert frames == [frame]
-    assert found["node"]["nodes"] == ["/outer/inner/node"]
-    assert found["alone"]["nodes"] == ["/alone/alone"]
-    assert found["static"]["nodes"] == ["/outer/inner/tfcompose_static"]
-    moved = found["static"].get("remap", {}).get("/tf_static")
+    assert processes["node"]["nodes"] == ["/outer/inner/node"]
+    assert processes["alone"]["nodes"] == ["/alone/alone"]
+    assert processes["static"]["nodes"] == ["/outer/inner/tfcompose_static"]
+    moved = processes["static"].get("remap", {}).get("/tf_static")
     assert moved == ("/outer/inner/tf_static" if isolate in {"both", "topics"} else None)
 
 
 def test_remappings_come_before_those_of_each_node(tmp_path: Path) -> None:
-    found, _ = processes_of(tmp_path, "none", "-r", "chatter:=loud", "--remap", "/tf:=tf", "--")
-    assert found["node"]["remap"] == {"/tf": "/inner/tf", "chatter": "loud"}
-    assert found["node"]["argv"].count("chatter:=loud") == 1
-    assert found["node"]["ready"]["text"] == "/inner/loud"
-    assert found["guard"]["remap"]["/tf"] == "/inner/tf"
-    assert found["plain"]["argv"] == ["sleep", "9"]
+    processes, _ = processes_of(
+        tmp_path, "none", "-r", "chatter:=loud", "--remap", "/tf:=tf", "--"
+    )
+    assert processes["node"]["remap"] == {"/tf": "/inner/tf", "chatter": "loud"}
+    assert processes["node"]["argv"].count("chatter:=loud") == 1
+    assert processes["node"]["ready"]["text"] == "/inner/loud"
+    assert processes["guard"]["remap"]["/tf"] == "/inner/tf"
+    assert processes["plain"]["argv"] == ["sleep", "9"]
 
 
 def test_the_clock_is_that_of_all_nodes(tmp_path: Path) -> None:
-    found, _ = processes_of(tmp_path, "none", "-p", "use_sim_time:=True")
-    assert "use_sim_time:=true" in found["node"]["argv"]
+    processes, _ = processes_of(tmp_path, "none", "-p", "use_sim_time:=True")
+    assert "use_sim_time:=true" in processes["node"]["argv"]
 
 
 def test_a_log_level_is_that_of_the_nodes_without_one(tmp_path: Path) -> None:
-    found, _ = processes_of(tmp_path, "none", "--log-level", "DEBUG")
-    levels = {name: process.get("log_level") for name, process in found.items()}
+    processes, _ = processes_of(tmp_path, "none", "--log-level", "DEBUG")
+    levels = {name: process.get("log_level") for name, process in processes.items()}
     assert levels == {
         "static": None,
         "node": "debug",
@@ -68,8 +70,8 @@ def test_a_log_level_is_that_of_the_nodes_without_one(tmp_path: Path) -> None:
         "plain": None,
         "guard": None,
     }
-    assert found["node"]["argv"][-2:] == ["--log-level", "debug"]
-    assert found["alone"]["argv"].count("--log-level") == 1
+    assert processes["node"]["argv"][-2:] == ["--log-level", "debug"]
+    assert processes["alone"]["argv"].count("--log-level") == 1
 
 
 @pytest.mark.parametrize(

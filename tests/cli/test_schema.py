@@ -206,7 +206,7 @@ def test_a_robot_without_its_name_or_version_is_refused() -> None:
     assert validator("robot").is_valid({"tfcompose": 1, "robot": "r", "x-mine": {"a": [1]}})
 
 
-def test_every_key_has_a_place_in_the_schema_and_every_mapping_says_what_it_is() -> None:
+def test_every_key_has_a_place_and_every_mapping_a_description() -> None:
     for language in ("robot", "preset"):
         schema = json.loads(schema_text(language))
         for definition in [

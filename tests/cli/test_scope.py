@@ -60,10 +60,10 @@ def test_a_robot_of_another_domain_is_refused_with_the_command_for_it(
 
 
 def test_the_domain_decides_between_robots(runs: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    here, there = runs("rover", 67), runs("crawler", 72)
-    assert chosen_run(None, "down").name == here.name
+    rover, crawler = runs("rover", 67), runs("crawler", 72)
+    assert chosen_run(None, "down").name == rover.name
     monkeypatch.setenv("ROS_DOMAIN_ID", " 72 ")
-    assert chosen_run(None, "down").name == there.name
+    assert chosen_run(None, "down").name == crawler.name
 
 
 def test_two_robots_in_the_domain_need_a_name(
@@ -77,7 +77,7 @@ def test_two_robots_in_the_domain_need_a_name(
     assert "crawler@67" in errors
 
 
-def test_the_robot_file_of_the_folder_names_one_that_has_a_domain_of_its_own(
+def test_the_robot_file_of_the_folder_names_a_robot_in_its_own_domain(
     runs: Run, tmp_path: Path
 ) -> None:
     runs("crawler", 71)
@@ -153,9 +153,9 @@ def test_the_plan_of_the_domains_robot_is_known(
 ) -> None:
     assert run_of_domain() is None
     rover = runs("rover", 67)
-    found = run_of_domain()
-    assert found is not None
-    assert (found[0].name, found[1].robot) == (rover.name, "rover")
+    run = run_of_domain()
+    assert run is not None
+    assert (run[0].name, run[1].robot) == (rover.name, "rover")
     monkeypatch.setenv("ROS_DOMAIN_ID", "1")
     assert run_of_domain() is None
 

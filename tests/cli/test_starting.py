@@ -12,7 +12,7 @@ from tfcompose.model.plan import Plan, RosSettings
 
 
 @pytest.mark.parametrize("goes", [True, False])
-def test_a_robot_in_the_background_warns_of_a_logout_that_removes_its_folder(
+def test_a_background_robot_warns_of_a_logout_that_removes_its_folder(
     *,
     goes: bool,
     tmp_path: Path,

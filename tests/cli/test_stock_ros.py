@@ -79,7 +79,7 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_the_tree_is_complete_everybody_publishes_their_own_and_the_description_is_the_full_one(
+def test_the_tree_and_description_are_complete_and_each_owner_publishes(
     tmp_path: Path, start: Callable[..., Started], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program = tmp_path / "prefix/lib/robot_state_publisher/robot_state_publisher"

@@ -83,7 +83,7 @@ def test_frames_that_differ_still_differ_when_they_are_shortened() -> None:
 @pytest.mark.parametrize(
     "name", ["autonomous_robot", "field_rover", "house_robot", "picker", "two_rovers"]
 )
-def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(
+def test_a_narrow_tree_wraps_and_omits_only_kinds_that_owners_imply(
     name: str, columns: int
 ) -> None:
     robot = compile_robot(
@@ -102,15 +102,13 @@ def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(
         for root in robot.roots()
         for _, line in draw_tree(robot.children(), root, lambda edge: edge.child)
     ):
-        wanted = [edge.child, edge.owner, *pose_text(edge).split()]
-        assert all(word in words for word in wanted), f"{wanted} stand there in this order"
+        expected = [edge.child, edge.owner, *pose_text(edge).split()]
+        assert all(word in words for word in expected), f"{expected} stand there in this order"
 
 
 @pytest.mark.parametrize("columns", [60, 80, 120])
 @pytest.mark.parametrize("name", ["realsense/d455", "hesai/ot128"])
-def test_a_page_of_a_preset_has_no_line_wider_than_the_terminal_and_every_word(
-    name: str, columns: int
-) -> None:
+def test_a_preset_page_fits_the_terminal_and_keeps_every_word(name: str, columns: int) -> None:
     facts = preset_page.facts(name, library())
     page = preset_page.text(facts, columns)
     assert max(map(len, page.splitlines())) <= columns

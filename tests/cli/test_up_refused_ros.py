@@ -34,7 +34,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "robot.yaml").write_text(ROVER, encoding="utf-8")
 
 
-def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
+def test_without_ros_one_sentence_names_what_to_install(
     tmp_path: Path,
 ) -> None:
     stubs = tmp_path / "stubs"
@@ -63,7 +63,7 @@ def test_settle_without_a_guard_is_wrong_use() -> None:
     assert "--settle" in tfcompose("up", "--guard", "off", "--settle", "1", code=2).stderr
 
 
-def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(
+def test_missing_packages_are_named_once_with_a_profile_that_needs_none(
     tmp_path: Path,
 ) -> None:
     simulated = "drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}"
@@ -80,7 +80,7 @@ def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(
     assert errors.endswith(": tfcompose up robot.yaml --profile demo\n")
 
 
-def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_searches_it(
+def test_an_error_of_a_background_launcher_is_kept(
     tmp_path: Path,
 ) -> None:
     code = """
@@ -97,16 +97,16 @@ sys.exit(main(["up", "-d"]))
     assert "ZeroDivisionError: of a launcher" in error_file.read_text()
 
 
-def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
+def test_a_dry_run_is_equal_everywhere_starts_nothing_and_writes_nothing(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "robot.yaml").write_text(f"{ROVER}  web: {{run: [serve], cwd: .}}\n")
-    shown = tfcompose("up", "--dry-run").stdout
-    assert "folder   ${build_dir}/../.." in shown
+    dry_run = tfcompose("up", "--dry-run").stdout
+    assert "folder   ${build_dir}/../.." in dry_run
     assert not (tmp_path / "build").exists()
-    assert str(tmp_path) not in shown
+    assert str(tmp_path) not in dry_run
     assert [
-        word in shown for word in ("${tfcompose}", "${plan}", "odom → base_link", "20 Hz")
+        word in dry_run for word in ("${tfcompose}", "${plan}", "odom → base_link", "20 Hz")
     ] == [True] * 4
     tfcompose("build")
-    assert tfcompose("up", "build/rover/plan.json", "--dry-run").stdout == shown
+    assert tfcompose("up", "build/rover/plan.json", "--dry-run").stdout == dry_run

@@ -102,7 +102,7 @@ def rogue(domain: object) -> Iterator[Callable[[], subprocess.Popen[str]]]:
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.2, 0.5, 1.2])
-def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
+def test_ctrl_c_during_the_start_leaves_no_process_and_no_traceback(
     up: Callable[..., RunningRobot], seconds: float
 ) -> None:
     """0 is a clean stop; 130 before anything was started."""
@@ -121,19 +121,21 @@ def test_own_processes_are_forked_from_the_launcher_and_end_with_it(
 ) -> None:
     robot = up(ROVER)
     robot.says("tree complete")
-    own = robot.below()
+    processes = robot.below()
     # The kernel gives each program that is executed random bytes at an address of its own.
     vector = Path(f"/proc/{robot.popen.pid}/auxv").read_bytes()
     forked = [
-        process for process in own if Path(f"/proc/{process.pid}/auxv").read_bytes() == vector
+        process
+        for process in processes
+        if Path(f"/proc/{process.pid}/auxv").read_bytes() == vector
     ]
     assert {process.cmdline()[2] for process in forked} >= {"guard", "static"}
     assert all(process.environ()["TFCOMPOSE_RUN"] for process in forked)
     robot.popen.kill()
-    assert until(lambda: all(map(gone, own)))
+    assert until(lambda: all(map(gone, processes)))
 
 
-def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_once(
+def test_policy_stop_ends_everything_with_1_and_names_the_offender_once(
     up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:
     robot = up(ROVER + "guard: {on_violation: stop}\n")
@@ -142,12 +144,12 @@ def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_o
     rogue()
     assert robot.wait() == 1
     assert [process for process in below if not gone(process)] == []
-    (found,) = [line for line in robot.text.splitlines() if "error[TF801]" in line]
-    assert all(name in found for name in ("odom → base_link", "/strange/rogue;", "drive (/drive)"))
+    (line,) = [line for line in robot.text.splitlines() if "error[TF801]" in line]
+    assert all(name in line for name in ("odom → base_link", "/strange/rogue;", "drive (/drive)"))
     assert "stopping: TF801 foreign_publisher\n" in robot.text
 
 
-def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
+def test_an_edge_with_a_publisher_is_refused_with_the_name_of_its_node(
     up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:
     rogue()
@@ -157,7 +159,7 @@ def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
 
 
-def test_the_same_edges_by_another_name_are_refused_and_a_signal_ends_the_first_with_0(
+def test_equal_edges_of_another_robot_are_refused_and_a_signal_ends_with_0(
     up: Callable[..., RunningRobot],
 ) -> None:
     first = up(ROVER)
@@ -181,7 +183,7 @@ def test_the_same_edges_by_another_name_are_refused_and_a_signal_ends_the_first_
     assert "SIGTERM" not in first.text.split("stopping: ", 1)[1].split("\n", 1)[1]
 
 
-def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreported(
+def test_two_simultaneous_starts_of_the_same_edges_do_not_pass_unreported(
     up: Callable[..., RunningRobot], tmp_path: Path
 ) -> None:
     """Each says it, or the later of the two, which has ended then."""
@@ -200,7 +202,7 @@ def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreport
     ]
 
 
-def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at_the_end(
+def test_an_external_owner_is_awaited_by_name_and_missing_at_the_end(
     up: Callable[..., RunningRobot],
 ) -> None:
     robot = up(EXTERNAL, "--for", "6")
@@ -211,7 +213,7 @@ def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at
     assert re.search(r"error\[TF811\] drive\b.* odom → base_link", robot.text)
 
 
-def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
+def test_a_built_plan_starts_without_yaml_and_pydantic(
     up: Callable[..., RunningRobot], tmp_path: Path
 ) -> None:
     (tmp_path / "rover.yaml").write_text(ROVER, encoding="utf-8")
@@ -226,7 +228,7 @@ def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
     assert robot.end() == 0
 
 
-def test_without_a_guard_edges_are_still_reported_to_be_live_and_nobody_is_judged(
+def test_without_a_guard_live_edges_are_reported_and_no_node_is_judged(
     up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:
     rogue()
@@ -236,14 +238,14 @@ def test_without_a_guard_edges_are_still_reported_to_be_live_and_nobody_is_judge
     assert "TF80" not in robot.text
 
 
-def test_observing_before_the_start_takes_nothing_from_the_time_that_was_requested(
+def test_observing_before_the_start_does_not_shorten_the_requested_time(
     up: Callable[..., RunningRobot],
 ) -> None:
     begun = time.monotonic()
     robot = up(ROVER, "--settle", "3", "--for", "4")
     late = {"TF804", "TF805"}  # a busy machine is, in truth
-    code, found = robot.wait(), set(re.findall(r"\[(TF\d+)\]", robot.text))
-    assert code == bool(found & late), robot.text
-    assert not found - late, robot.text
+    code, codes = robot.wait(), set(re.findall(r"\[(TF\d+)\]", robot.text))
+    assert code == bool(codes & late), robot.text
+    assert not codes - late, robot.text
     assert time.monotonic() - begun >= 7
     assert "tree complete" in robot.text

@@ -34,7 +34,7 @@ PAGE = "The pump is off.\n\nSwitch it on.\n"
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_each_file_is_a_code_and_a_page_whose_first_paragraph_is_a_sentence(file: Path) -> None:
+def test_each_file_is_a_code_and_a_page_that_starts_with_a_sentence(file: Path) -> None:
     assert CATALOGUE[file.stem] == read_code(file.stem, file.read_text("utf-8"))
     summary = CATALOGUE.summary(file.stem)
     assert re.fullmatch(r"[^\n]{9,109}\.", summary)
@@ -102,7 +102,7 @@ def test_a_file_that_is_not_understood_says_which_and_why(text: str, why: str) -
         read_code("ACME101", text)
 
 
-def test_a_finding_has_the_name_and_the_severity_of_its_code_unless_it_says_otherwise() -> None:
+def test_a_finding_takes_name_and_severity_from_its_code_by_default() -> None:
     warning = finding("TF207", "message", None)
     assert (warning.name, warning.severity) == ("wrong_chain_order", "warning")
     assert finding("TF207", "message", None, severity="error").severity == "error"
@@ -125,7 +125,7 @@ def test_a_code_is_found_by_its_name_too() -> None:
     assert not similar_words("TF999")
 
 
-def test_a_robot_that_cannot_be_built_or_is_not_understood_cannot_be_allowed() -> None:
+def test_an_error_that_prevents_the_build_cannot_be_allowed() -> None:
     assert not Code("TF202", "cycle", "tree", "error", unbuildable=True).can_be_allowed
     assert not CATALOGUE["TF101"].can_be_allowed
     assert CATALOGUE["TF301"].can_be_allowed

@@ -45,17 +45,19 @@ def test_a_process_is_as_psutil_has_it() -> None:
     with processes.start(argv, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
         assert child.stdout
         assert child.stdout.readline()
-        other, stat = psutil.Process(child.pid), procfs.stat(child.pid)
+        expected, stat = psutil.Process(child.pid), procfs.stat(child.pid)
         assert child.pid in procfs.pids()
-        assert procfs.argv(child.pid) == other.cmdline() == argv
+        assert procfs.argv(child.pid) == expected.cmdline() == argv
         assert env.items() <= procfs.environ(child.pid).items()
-        assert procfs.environ(child.pid) == other.environ()
+        assert procfs.environ(child.pid) == expected.environ()
         assert (stat.parent, stat.group) == (os.getpid(), child.pid)
         ticks_per_s = os.sysconf("SC_CLK_TCK")
-        assert stat.ticks / ticks_per_s == pytest.approx(sum(other.cpu_times()[:2]), abs=0.05)
+        assert stat.ticks / ticks_per_s == pytest.approx(sum(expected.cpu_times()[:2]), abs=0.05)
         began = psutil.boot_time() + stat.began / ticks_per_s
-        assert began == pytest.approx(other.create_time(), abs=2)
-        assert procfs.memory_bytes(child.pid) == pytest.approx(other.memory_full_info().pss, 0.1)
+        assert began == pytest.approx(expected.create_time(), abs=2)
+        assert procfs.memory_bytes(child.pid) == pytest.approx(
+            expected.memory_full_info().pss, 0.1
+        )
         assert procfs.has_loaded(child.pid, "_ctypes.")
         assert not procfs.has_loaded(child.pid, "librcl.so")
         assert procfs.network(child.pid) == procfs.network("self")

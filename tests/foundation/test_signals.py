@@ -36,9 +36,9 @@ def lose_an_interrupt() -> None:
 
 @pytest.fixture(autouse=True)
 def lost(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    found: list[object] = []
-    monkeypatch.setattr(sys, "unraisablehook", lambda what: found.append(what.exc_type))
-    return found
+    errors: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda what: errors.append(what.exc_type))
+    return errors
 
 
 def test_the_launcher_takes_an_interrupt_that_python_threw_away(lost: list[object]) -> None:
@@ -76,7 +76,7 @@ def test_an_interrupt_comes_to_pydantic_as_soon_as_that_has_returned() -> None:
 @pytest.mark.parametrize(
     "error", [RuntimeError("Error calling __set_name__"), BaseException("a panic of Rust")]
 )
-def test_an_interrupt_that_became_another_error_while_a_command_loads_ends_it(
+def test_an_interrupt_hidden_in_another_error_during_loading_ends_it(
     error: BaseException, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def load_and_run(_: object) -> int:

@@ -32,10 +32,14 @@ def test_below_a_frame_are_it_and_its_descendants(
 @given(EDGES)
 def test_each_root_has_its_tree_and_the_largest_comes_first(edges: list[tuple[str, str]]) -> None:
     graph = nx.DiGraph(edges)
-    found = trees(edges)
-    assert set(found) == {frame for frame in graph if graph.in_degree(frame) == 0}
-    assert all(frames == {root, *nx.descendants(graph, root)} for root, frames in found.items())
-    assert list(found) == sorted(found, key=lambda root: (-len(found[root]), root))
+    trees_by_root = trees(edges)
+    assert set(trees_by_root) == {frame for frame in graph if graph.in_degree(frame) == 0}
+    assert all(
+        frames == {root, *nx.descendants(graph, root)} for root, frames in trees_by_root.items()
+    )
+    assert list(trees_by_root) == sorted(
+        trees_by_root, key=lambda root: (-len(trees_by_root[root]), root)
+    )
 
 
 @given(EDGES)
@@ -43,13 +47,13 @@ def test_loops_are_cycles_that_hold_every_frame_that_is_in_one(
     edges: list[tuple[str, str]],
 ) -> None:
     graph = nx.DiGraph(edges)
-    found = loops(edges)
+    cycles = loops(edges)
     assert all(
         graph.has_edge(*edge)
-        for loop in found
+        for loop in cycles
         for edge in zip(loop, (*loop[1:], loop[0]), strict=True)
     )
-    assert all(len(set(loop)) == len(loop) and loop[0] == min(loop) for loop in found)
+    assert all(len(set(loop)) == len(loop) and loop[0] == min(loop) for loop in cycles)
     in_one = {
         frame
         for some in nx.strongly_connected_components(graph)
@@ -57,20 +61,22 @@ def test_loops_are_cycles_that_hold_every_frame_that_is_in_one(
         for frame in some
     }
     in_one |= {frame for frame in graph if graph.has_edge(frame, frame)}
-    assert {frame for loop in found for frame in loop} == in_one
+    assert {frame for loop in cycles for frame in loop} == in_one
 
 
 @given(st.dictionaries(FRAMES, FRAMES), FRAMES, FRAMES)
 def test_a_further_edge_closes_a_loop_where_its_child_is_above_its_parent(
     parents: dict[str, str], parent: str, child: str
 ) -> None:
-    others = nx.DiGraph([(above, frame) for frame, above in parents.items() if frame != child])
-    others.add_nodes_from((parent, child))
+    without_child = nx.DiGraph(
+        [(above, frame) for frame, above in parents.items() if frame != child]
+    )
+    without_child.add_nodes_from((parent, child))
     loop = loop_closed_by((parent, child), parents.get)
-    assert bool(loop) == (parent == child or nx.has_path(others, child, parent))
+    assert bool(loop) == (parent == child or nx.has_path(without_child, child, parent))
     if loop:
         assert (loop[0], loop[-1], loop[-2]) == (child, child, parent)
-        assert all(others.has_edge(*edge) for edge in pairwise(loop[:-1]))
+        assert all(without_child.has_edge(*edge) for edge in pairwise(loop[:-1]))
 
 
 def test_the_way_up_ends_at_the_root_and_before_a_frame_that_was_passed() -> None:

@@ -91,19 +91,19 @@ def mutated(draw: st.DrawFn) -> str:
     text = draw(st.sampled_from(ROBOTS))
     for _ in range(draw(st.integers(1, 4))):
         lines = text.split("\n")
-        at = draw(st.integers(0, len(lines) - 1))
+        index = draw(st.integers(0, len(lines) - 1))
         kind = draw(st.integers(0, 4))
         if kind == 0:
-            lines.insert(at, draw(st.sampled_from(lines)))
+            lines.insert(index, draw(st.sampled_from(lines)))
         elif kind == 1:
-            del lines[at]
+            del lines[index]
         else:
-            words = lines[at].split(" ")
+            words = lines[index].split(" ")
             which = draw(st.integers(0, len(words) - 1))
             words[which] = draw(
                 st.sampled_from(WORDS) | st.sampled_from(ODD) | st.text(max_size=4)
             )
-            lines[at] = " ".join(words)
+            lines[index] = " ".join(words)
         text = "\n".join(lines)
     return text
 
@@ -166,9 +166,7 @@ def test_any_change_of_a_plan_is_read_or_refused(data: Any) -> None:
     "value", [10**400, -(10**400), 1e308, float("nan"), float("inf"), True, None, "1", [], {}]
 )
 @pytest.mark.parametrize("key", ["xyz", "quat_xyzw", "pose", "rate", "source", "owner", "joint"])
-def test_a_plan_with_a_wrong_value_in_an_edge_is_refused_or_read_and_never_crashes(
-    key: str, value: Any
-) -> None:
+def test_a_plan_with_a_wrong_value_in_an_edge_never_crashes(key: str, value: Any) -> None:
     data = json.loads(PLANS[0])
     poses = {"xyz": [[value] * 3, [0, 0, 0, 1]], "quat_xyzw": [[0] * 3, [0, 0, 0, value]]}
     data["edges"][0] |= {"pose": poses[key]} if key in poses else {key: value}

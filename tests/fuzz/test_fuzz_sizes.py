@@ -142,9 +142,12 @@ def test_a_command_takes_in_proportion_to_the_size(
     for size in (20, 100, 200, 400):
         file = Path(f"{make.__name__}{size}.{'urdf' if make in URDFS else 'yaml'}")
         file.write_text(make(size), "utf-8")
-        at = 2 if words[0] == "export" else 1
-        rest = [{"LAST": f"f{size - 1}", "FILE": str(file)}.get(word, word) for word in words[at:]]
-        counts.append(lines_run([*words[:at], str(file), *rest]))
+        position = 2 if words[0] == "export" else 1
+        rest = [
+            {"LAST": f"f{size - 1}", "FILE": str(file)}.get(word, word)
+            for word in words[position:]
+        ]
+        counts.append(lines_run([*words[:position], str(file), *rest]))
     _, *counts = counts  # loads what is loaded once
     first, second = counts[1] - counts[0], counts[2] - counts[1]
     assert second < 2.3 * first, (make.__name__, words, counts)

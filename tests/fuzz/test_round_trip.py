@@ -116,7 +116,7 @@ def robots(draw: st.DrawFn) -> tuple[dict[str, Any], list[Wanted]]:
         "frames": {},
     }
     spec |= {"sensors": {}, "processes": {"drive": {"external": True}}, "guard": {"mode": "off"}}
-    names, wanted, masters = (
+    names, expected, masters = (
         ["base_link"],
         [],
         [],
@@ -127,7 +127,7 @@ def robots(draw: st.DrawFn) -> tuple[dict[str, Any], list[Wanted]]:
             "odom": {},
             "base_link": {"parent": "odom", "owner": "drive", "rate": "50 Hz"} | pose,
         }
-        wanted.append(Wanted("odom", "base_link", matrix, "drive", "dynamic"))
+        expected.append(Wanted("odom", "base_link", matrix, "drive", "dynamic"))
     for index in range(draw(st.integers(0, 10))):
         parent, (pose, matrix) = draw(st.sampled_from(names)), draw(poses())
         kind = draw(
@@ -150,15 +150,15 @@ def robots(draw: st.DrawFn) -> tuple[dict[str, Any], list[Wanted]]:
             edge.child = f"{name}_link"
         else:
             spec["links"][name] = {}
-            own: dict[str, Any] = {"type": "fixed"}
+            joint_keys: dict[str, Any] = {"type": "fixed"}
             if kind == "joints":
-                own, edge.more = joint(draw, f"j{index}", masters)
-                edge.owner, edge.kind, edge.joint = "joints", "joint", own["type"]
+                joint_keys, edge.more = joint(draw, f"j{index}", masters)
+                edge.owner, edge.kind, edge.joint = "joints", "joint", joint_keys["type"]
                 masters += [] if edge.more["mimic"] else [f"j{index}"]
-            spec["joints"][f"j{index}"] = output | own | {"child": name}
+            spec["joints"][f"j{index}"] = output | joint_keys | {"child": name}
         names.append(edge.child)
-        wanted.append(edge)
-    return spec, wanted
+        expected.append(edge)
+    return spec, expected
 
 
 def built(spec: dict[str, Any]) -> dict[str, str]:
@@ -177,29 +177,29 @@ def matrix_of(edge: dict[str, Any]) -> Any:
 
 @given(robots())
 @settings(max_examples=40, deadline=None)
-def test_the_urdf_holds_every_edge_below_base_with_its_pose_type_and_limits(
+def test_the_urdf_keeps_pose_type_and_limits_of_every_edge_below_base(
     given: tuple[Any, list[Wanted]],
 ) -> None:
-    spec, wanted = given
+    spec, expected = given
     read = yourdfpy.URDF.load(
         io.StringIO(built(spec)["robot.urdf"]), build_scene_graph=False, load_meshes=False
     )
     joints = {joint.child: joint for joint in read.robot.joints}
-    below = {edge.child: edge for edge in wanted if edge.child != "base_link"}
+    below = {edge.child: edge for edge in expected if edge.child != "base_link"}
     assert set(read.link_map) == {"base_link", *below}
     assert set(joints) == set(below)
     assert len(read.robot.joints) == len(read.joint_map) == len(below)
     for child, edge in below.items():
-        found = joints[child]
-        assert (found.parent, found.type) == (edge.parent, edge.joint)
-        origin = np.eye(4) if found.origin is None else found.origin
+        read_joint = joints[child]
+        assert (read_joint.parent, read_joint.type) == (edge.parent, edge.joint)
+        origin = np.eye(4) if read_joint.origin is None else read_joint.origin
         assert origin == pytest.approx(edge.matrix, abs=1e-9)
         if edge.more:
-            assert found.name == edge.more["name"]
-            assert found.axis == pytest.approx(edge.more["axis"], abs=1e-12)
+            assert read_joint.name == edge.more["name"]
+            assert read_joint.axis == pytest.approx(edge.more["axis"], abs=1e-12)
             limit, mimic = edge.more["limit"], edge.more["mimic"]
-            assert limit is None or vars(found.limit) == limit
-            assert (found.mimic and vars(found.mimic)) == mimic
+            assert limit is None or vars(read_joint.limit) == limit
+            assert (read_joint.mimic and vars(read_joint.mimic)) == mimic
 
 
 @given(robots())
@@ -207,12 +207,12 @@ def test_the_urdf_holds_every_edge_below_base_with_its_pose_type_and_limits(
 def test_the_plan_holds_every_edge_once_with_its_pose_and_owner(
     given: tuple[Any, list[Wanted]],
 ) -> None:
-    spec, wanted = given
+    spec, expected = given
     plan = json.loads(built(spec)["plan.json"])
-    found = {edge["child"]: edge for edge in plan["edges"]}
-    assert len(found) == len(plan["edges"]) == len(wanted)
-    for edge in wanted:
-        observed = found[edge.child]
+    edges_by_child = {edge["child"]: edge for edge in plan["edges"]}
+    assert len(edges_by_child) == len(plan["edges"]) == len(expected)
+    for edge in expected:
+        observed = edges_by_child[edge.child]
         assert (observed["parent"], observed["owner"], observed["kind"]) == (
             edge.parent,
             edge.owner,
@@ -223,9 +223,9 @@ def test_the_plan_holds_every_edge_once_with_its_pose_and_owner(
         process["name"]: {tuple(pair) for pair in process.get("owns", ())}
         for process in plan["processes"]
     }
-    for owner in {edge.owner for edge in wanted}:
+    for owner in {edge.owner for edge in expected}:
         assert owned[owner] == {
-            (edge.parent, edge.child) for edge in wanted if edge.owner == owner
+            (edge.parent, edge.child) for edge in expected if edge.owner == owner
         }
 
 
@@ -234,15 +234,15 @@ def test_the_plan_holds_every_edge_once_with_its_pose_and_owner(
 def test_in_the_urdf_for_a_stock_publisher_only_edges_of_others_float(
     given: tuple[Any, list[Wanted]],
 ) -> None:
-    spec, wanted = given
+    spec, expected = given
     read = yourdfpy.URDF.load(
         io.StringIO(built(spec)["robot.state_publisher.urdf"]),
         build_scene_graph=False,
         load_meshes=False,
     )
-    foreign = {edge.child for edge in wanted if edge.owner == "drive"} - {"base_link"}
+    foreign = {edge.child for edge in expected if edge.owner == "drive"} - {"base_link"}
     assert {joint.child for joint in read.robot.joints if joint.type == "floating"} == foreign
-    assert {joint.child for joint in read.robot.joints} == {edge.child for edge in wanted} - {
+    assert {joint.child for joint in read.robot.joints} == {edge.child for edge in expected} - {
         "base_link"
     }
 

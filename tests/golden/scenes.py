@@ -8,13 +8,17 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
 from dataclasses import replace
 from functools import partial
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
 from unittest import mock
+
+import numpy as np
 
 from tests.support import guard_history as guarded
 from tests.support.bags import drive, write_bag
@@ -47,6 +51,7 @@ from tests.support.tree_history import (
     sound_tree,
 )
 from tfcompose.cli import live, writing
+from tfcompose.cli.adjusting import moved
 from tfcompose.cli.commands import echo
 from tfcompose.cli.compiling import disk, library, missing_confinement
 from tfcompose.cli.parser import main
@@ -59,6 +64,7 @@ from tfcompose.compiler.urdf.lint import lint_urdf
 from tfcompose.compiler.urdf.packages import Disk, Packages
 from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose
+from tfcompose.foundation.signals import Stop
 from tfcompose.foundation.tool import Command as ToolCommand
 from tfcompose.foundation.tool import Key, Tool, installed_tools
 from tfcompose.guard.losses import datagrams_lost
@@ -87,7 +93,7 @@ from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import share_of
 from tfcompose.model.robot import Robot
 from tfcompose.model.robot.body import Asset
-from tfcompose.spec.language import find_overlay, load_robot_overlay, set_value
+from tfcompose.spec.language import compose, find_overlay, overlay_files, set_value
 from tfcompose.spec.language.tool_keys import problems_with
 from tfcompose.spec.load import Source, load
 from tfcompose.tf.bags import BagError
@@ -103,15 +109,21 @@ from tfcompose.tf.live.state import (
 )
 from tfcompose.tf.process import read_own
 from tfcompose.tf.ros import environment
+from tfcompose.tf.ros.environment import RosError
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
+from tfcompose.tools.adjust import calibrate
+from tfcompose.tools.adjust.saving import save_poses
+from tfcompose.tools.adjust.selection import select_edges
 from tfcompose.tools.deploy.connection import LostError, Settings, connect_host
 from tfcompose.tools.deploy.rollout import Rollout, target_of
+from tfcompose.tools.exporters import command as exporters
 from tfcompose.tools.fleet import command as fleet
 from tfcompose.tools.fleet.check import check_fleet
 from tfcompose.tools.fleet.observe import EdgeStatus, FleetRobotStatus, LinkState, problems_of
 from tfcompose.tools.fleet.spec import validate_fleet
 from tfcompose.tools.importers.draft import ImportDraft
 from tfcompose.tools.importers.shell import add_script
+from tfcompose.tools.prove.clouds import Cloud
 from tfcompose.tools.prove.command import findings_of
 from tfcompose.tools.prove.messages import CLOUDS, IMAGES, IMU, ODOMETRY, MeasuredTopic
 from tfcompose.tools.prove.proof import Proof
@@ -120,6 +132,9 @@ from tfcompose.tools.rebag import command as rebag
 from tfcompose.tools.rebag import play
 from tfcompose.tools.rebag.messages import MessageEditor
 from tfcompose.tools.rebag.recorded_topic import RecordedTopic
+from tfcompose.tools.treetest import running
+from tfcompose.tools.treetest.cases import CaseLoader
+from tfcompose.tools.treetest.running import run_case
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 AN_EXAMPLE = finding("TF801", "an example's", None)
@@ -240,9 +255,9 @@ def _graphs() -> Iterator[TreeState]:
         sent_joints=(_sender("/broadcaster", "sholder"),),
     )
     rogue = _sender("/rogue", "shoulder")
-    for other in (_sender("/broadcaster", "shoulder", "elbow"), rogue):
+    for sender in (_sender("/broadcaster", "shoulder", "elbow"), rogue):
         yield sound_tree().observed(
-            graph=(heard,), moving_joints=joints, sent_joints=(other, rogue)
+            graph=(heard,), moving_joints=joints, sent_joints=(sender, rogue)
         )
 
 
@@ -280,9 +295,9 @@ def _setups() -> Iterator[TreeState]:
     yield replace(nothing, nodes=("/listener", "/talker"), plan=sound_plan())
     yield replace(nothing, plan=sound_plan())
     yield replace(nothing, graph=(TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),))
-    other = {"ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"}
-    yield replace(nothing, processes=(RosProcess(9, "nav", other),))
-    yield replace(nothing, processes=tuple(RosProcess(pid, "nav", other) for pid in range(5)))
+    variables = {"ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"}
+    yield replace(nothing, processes=(RosProcess(9, "nav", variables),))
+    yield replace(nothing, processes=tuple(RosProcess(pid, "nav", variables) for pid in range(5)))
     for settings in (
         {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"},
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LAN"},
@@ -339,7 +354,7 @@ def with_a_plan() -> Iterator[Finding]:
 def guard() -> Iterator[Finding]:
     """Judge message by message."""
     for history in (*_strangers(), *_shapes(), *_settings(), *_clocks(), *_lost()):
-        yield from history.found()
+        yield from history.findings()
     yield from _drivers()
 
 
@@ -391,9 +406,9 @@ def _strangers() -> Iterator[guarded.History]:
     yield _sent("/slamer", "odom base", processes=nodes)
     yield _sent("/slamer", "map base", processes=nodes)
     twice = _running()
-    first, other = twice.joins("/slam"), twice.joins("/slam")
+    first, second = twice.joins("/slam"), twice.joins("/slam")
     for _ in range(10):
-        twice.send(first, "map odom").wait(0.1).send(other, "map odom").wait(0.1)
+        twice.send(first, "map odom").wait(0.1).send(second, "map odom").wait(0.1)
     yield twice
     unsure = _running(gids=False)
     unsure.joins("/drive")
@@ -403,10 +418,10 @@ def _strangers() -> Iterator[guarded.History]:
             PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")
         )
     )
-    other = misnamed.joins("/other")
-    misnamed.send(other, "map odom")
+    second = misnamed.joins("/other")
+    misnamed.send(second, "map odom")
     writer = Publisher(
-        other.gid,
+        second.gid,
         "/other",
         static=False,
         ours=True,
@@ -432,9 +447,9 @@ def _shapes() -> Iterator[guarded.History]:
     yield _sent("/slam", "map odom", static=True)
     for names in (("/a", "/b"), ("/a", "/a")):
         both = _running(guard=GuardPolicy(allow=(EdgePattern("*", "person_*"),)))
-        first, other = (both.joins(name) for name in names)
+        first, second = (both.joins(name) for name in names)
         for _ in range(10):
-            both.send(first, "map person_1").send(other, "map person_1").wait(0.1)
+            both.send(first, "map person_1").send(second, "map person_1").wait(0.1)
         yield both
 
 
@@ -514,7 +529,7 @@ def _drivers() -> Iterator[Finding]:
         both = (process, PlanProcess("static", "static"))
         planned = edges if drives.publishes else (guarded.edge("link lens", "static", "static"),)
         for sent in ("link depth", "base lens", "link lens"):
-            yield from _sent(node, sent, static=True, edges=planned, processes=both).found()
+            yield from _sent(node, sent, static=True, edges=planned, processes=both).findings()
     front = PlanProcess("front", "run", nodes=(node,), drives=(driven,))
     plan = Plan("rover", "0", "link", RosSettings(), edges, (front,))
     for count in (1, 2):
@@ -537,7 +552,7 @@ def _drivers() -> Iterator[Finding]:
 def launcher() -> Iterator[Finding]:
     """Replay histories to the process machine, and look at plans before a start."""
     for history in _machines():
-        yield from (*history.found(), *history.late)
+        yield from (*history.findings(), *history.late)
     with TemporaryDirectory() as folder, inside(folder):
         for plan, env in _unfit():
             base, file = {"PATH": "/nowhere", **env}, Path(folder, "plan.json")
@@ -701,9 +716,9 @@ def surroundings() -> Iterator[Finding]:
     strict = replace(elsewhere, guard=GuardPolicy("strict"))
     shares = ((plan, "jetson"), (elsewhere, "jetsn"), (elsewhere, None), (strict, None))
     yield from (
-        found
+        share
         for some, host in shares
-        if isinstance(found := share_of(some, host, "laptop"), Finding)
+        if isinstance(share := share_of(some, host, "laptop"), Finding)
     )
     with mock.patch.object(environment, "find_spec", return_value=None):
         yield environment.no_ros() or AN_EXAMPLE
@@ -816,8 +831,10 @@ def compiled() -> Iterator[Finding]:
     for file in ([], ["ant.yaml"]):
         yield from _refused(partial(find_overlay, many, "an", file))
     yield from _refused(partial(find_overlay, load(HEAD, "robot.yaml"), "ant", ()))
-    overlay = "overlays: {by: hostname, folder: units}\n"
-    yield from _refused(partial(load_robot_overlay, "units/ant.yaml", lambda _: overlay))
+    yield from _refused(partial(overlay_files, many, lambda _: ["ant.yml"]))
+    yield from compose(many, overlays=[load("overlays: {by: hostname}\n", "ant.yaml")]).findings
+    in_profile = f"{HEAD}profiles: {{demo: {{overlays: {{by: hostname}}}}}}\n"
+    yield from compose(load(in_profile, "robot.yaml")).findings
     robot = f"{HEAD}preset_path: presets\nsensors: {{s: {{preset: %s, parent: base_link}}}}\n"
     with TemporaryDirectory() as folder, inside(folder):
         for name, text in {
@@ -894,6 +911,129 @@ def corrected() -> Iterator[Finding]:
     yield from play.warnings_of(["base_link → bracket"])
 
 
+#: A lens in the base.
+MEASURED = """\
+header: {frame_id: base_link}
+child_frame_id: lidar
+transform: {translation: {x: 0, y: 0, z: 0.31}, rotation: {x: 0, y: 0, z: 0, w: 1}}
+"""
+
+
+def calibrated() -> Iterator[Finding]:
+    """Calibrate what is no mount, and with an overlay that cannot be written."""
+    refuse = mock.patch.object(calibrate, "reject", side_effect=_rejected)
+    printed = redirect_stdout(StringIO())
+    with TemporaryDirectory() as folder, inside(folder), refuse, printed:
+        text = f"{ROVER}overlays: {{by: hostname, folder: units}}\n"
+        Path("robot.yaml").write_text(text, "utf-8")
+        Path("units").mkdir()
+        Path("units/ant.yaml").write_text("{frames: {lidar: {rpy: [0, 0, 0.01]}}}\n", "utf-8")
+        Path("new.yaml").write_text(MEASURED, "utf-8")
+        for name, robot in (("lidr", "bee"), ("base_link", "bee"), ("lidar", "ant")):
+            options = ["--with", "new.yaml", "--robot", robot]
+            yield from _refused(partial(main, ["calibrate", name, *options]))
+        yield from _refused(partial(main, ["calibrate", "lidar", "--undo", "--robot", "bee"]))
+        options = ["--with", "new.yaml", "--robot", "a/b"]
+        yield from _refused(partial(main, ["calibrate", "lidar", *options]))
+
+
+#: A recording lacks the laser, and is too slow.
+TESTED = """\
+robot: robot.yaml
+cases:
+  - name: drives
+    bag: bag
+    expect:
+      complete: 100 ms
+      edges:
+        odom → base_link: {owner: static, rate: [10 Hz, 20 Hz], age: 1 ms}
+        base_link → laser: {}
+      pose:
+        odom → base_link: {xyz: [0, 0, 0], within: 1 m}
+        base_link → laser: {xyz: [0, 0, 0]}
+      lookups: [{from: odom, to: laser, at: [1 s, 9 s]}]
+      findings: [{code: TF803, names: arm}]
+"""
+TESTED_ROBOT = """\
+tfcompose: 1
+robot: cart
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive}
+  laser: {parent: base_link, xyz: [0.24, 0, 0.3]}
+processes: {drive: {external: true, node: drive}}
+"""
+
+
+def tested() -> Iterator[Finding]:
+    """Test a recording that meets no expectation, and with names that the robot lacks."""
+    with TemporaryDirectory() as folder, inside(folder), Stop() as stop:
+        Path("robot.yaml").write_text(TESTED_ROBOT, "utf-8")
+        write_bag(Path("bag"), drive())
+        for text in (TESTED, TESTED.replace("base_link → laser: {}", "odom → laser: {}")):
+            Path("cart.test.yaml").write_text(text, "utf-8")
+            loader = CaseLoader(trust=False)
+            try:
+                cases = loader.load("cart.test.yaml")
+            except RejectedError as error:
+                yield from error.findings
+            else:
+                yield from run_case(cases[0], stop).findings
+        Path("cart.test.yaml").write_text(TESTED.replace("    bag: bag\n", ""), "utf-8")
+        (case,) = CaseLoader(trust=False).load("cart.test.yaml")
+        no_domain = RosError("every ROS domain is in use")
+        with (
+            mock.patch.object(running, "no_ros", return_value=None),
+            mock.patch.object(running, "reserve_domain", side_effect=no_domain),
+        ):
+            yield from run_case(case, stop).findings
+
+
+def exported() -> Iterator[Finding]:
+    """Export processes that XML launch files cannot start."""
+    text = "tfcompose: 1\nrobot: rover\nlinks: {base_link: {}}\nprocesses:\n"
+    text += "  map: {run: {package: maps, executable: server}, lifecycle: active}\n"
+    text += "  load: {run: [load]}\n  drive: {run: [drive], after: {load: done}}\n"
+    with TemporaryDirectory() as folder, inside(folder):
+        Path("robot.yaml").write_text(text, "utf-8")
+        with mock.patch.object(exporters, "reject", side_effect=_rejected):
+            command = ["export", "launch", "robot.yaml", "--format", "xml"]
+            yield from _refused(partial(main, command))
+
+
+def nudged() -> Iterator[Finding]:
+    """What `nudge` refuses, of the running plan alone."""
+    plan = compiled_plan(
+        ROVER.replace("lidar:", "imu: {parent: base_link}\n  lidar:")
+        + "joints: {neck: {type: revolute, parent: base_link, child: head, axis: [0, 0, 1],"
+        " limit: {lower: -1, upper: 1, effort: 1, velocity: 1}}}\nlinks: {head: {}}\n"
+    )
+    edges = {edge.child: edge for edge in plan.edges}
+    adjusted = {edge.child: moved(edge, Pose()) for edge in (edges["lidar"],)}
+    plan = replace(plan, edges=tuple((edges | adjusted).values()))
+    for name, restores in (
+        ("lidr", False),
+        ("camera", False),
+        ("base_link", False),
+        ("head", False),
+        ("imu", True),
+    ):
+        try:
+            select_edges(plan, name, restores=restores)
+        except RejectedError as error:
+            yield from error.findings
+
+
+def saved() -> Iterator[Finding]:
+    """What `nudge --save` refuses."""
+    with TemporaryDirectory() as folder, inside(folder):
+        Path("robot.yaml").write_text(ROVER.replace("robot: rover", "robot: cart"))
+        try:
+            save_poses(compiled_plan(ROVER), (), "robot.yaml", None)
+        except RejectedError as error:
+            yield from error.findings
+
+
 def proved() -> Iterator[Finding]:
     """Measure with an IMU that is mounted or read otherwise, and with other frames."""
     text = f"{ROVER}links: {{imu: {{parent: base_link}}, camera: {{parent: base_link}}}}\n"
@@ -918,6 +1058,46 @@ def proved() -> Iterator[Finding]:
         measurements.topics.update({topic.name: topic for topic in topics})
         proof = Proof(compiled.robot, compiled.sources[0], {"robot.yaml": text}, measurements)
         yield from findings_of(proof.verdicts())
+    yield from _lower_lidar()
+    yield from _overlapping_lidars()
+
+
+def _lower_lidar() -> Iterator[Finding]:
+    """Measure with a lidar that is lower than declared, over a floor."""
+    text = "tfcompose: 1\nrobot: rover\nlinks: {base_link: {}}\nframes:\n"
+    text += "  base_footprint: {parent: base_link, xyz: [0, 0, -0.2]}\n"
+    text += "  lidar: {parent: base_link, xyz: [0, 0, 0.3]}\n"
+    compiled = compile_robot(text, "robot.yaml", library())
+    assert compiled.robot is not None
+    x, y = np.meshgrid(np.linspace(-3, 3, 20), np.linspace(-3, 3, 20))
+    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -0.44)])
+    topic = MeasuredTopic("/points", CLOUDS[1], {"lidar": 10})
+    topic.clouds += [Cloud(float(at_s), points) for at_s in range(10)]
+    measurements = Measurements()
+    measurements.topics["/points"] = topic
+    proof = Proof(compiled.robot, compiled.sources[0], {"robot.yaml": text}, measurements)
+    yield from findings_of(proof.verdicts())
+
+
+def _overlapping_lidars() -> Iterator[Finding]:
+    """Measure a floor and two walls with two lidars, of which one is farther to the left."""
+    text = "tfcompose: 1\nrobot: rover\nlinks: {base_link: {}}\nframes:\n"
+    text += "  front: {parent: base_link, xyz: [0, 0, 0.3]}\n"
+    text += "  rear: {parent: base_link, xyz: [0, 0, 0.3]}\n"
+    compiled = compile_robot(text, "robot.yaml", library())
+    assert compiled.robot is not None
+    a, b = (each.ravel() for each in np.meshgrid(np.linspace(-2, 2, 20), np.linspace(0, 2, 20)))
+    floor = np.column_stack([a, 2 * b - 2, np.full(a.size, -0.5)])
+    walls = [np.column_stack(each) for each in ((a, a * 0 + 2, b - 0.5), (a * 0 + 2, a, b - 0.5))]
+    points = np.vstack([floor, *walls])
+    measurements = Measurements()
+    for frame, offset in (("front", 0.0), ("rear", -0.12)):
+        shift = np.array([0.0, offset, 0.0])
+        topic = MeasuredTopic(f"/{frame}", CLOUDS[1], {frame: 10})
+        topic.clouds += [Cloud(float(at_s), points + shift) for at_s in range(10)]
+        measurements.topics[topic.name] = topic
+    proof = Proof(compiled.robot, compiled.sources[0], {"robot.yaml": text}, measurements)
+    yield from findings_of(proof.verdicts())
 
 
 def imported() -> Iterator[Finding]:
@@ -1044,6 +1224,11 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     recordings,
     imported,
     corrected,
+    calibrated,
+    tested,
+    exported,
+    nudged,
+    saved,
     proved,
     foreign_tools,
     confined,

@@ -88,13 +88,13 @@ def within(
     text: str, file: str, texts: dict[str, str] | None = None, **more: Any
 ) -> list[Finding]:
     """Return everything that is found in a robot; ``texts`` stand in the place of files."""
-    known = texts or {}
+    texts_by_name = texts or {}
 
     def read(name: str) -> str:
-        return known[name] if name in known else read_text(name)
+        return texts_by_name[name] if name in texts_by_name else read_text(name)
 
     def is_file(name: str) -> bool:
-        return name in known or Path(name).is_file()
+        return name in texts_by_name or Path(name).is_file()
 
     files = replace(disk(), read=read, is_file=is_file, expand=expanded)
     compiled = compile_robot(text, file, presets(), read=read, disk=files, **more)

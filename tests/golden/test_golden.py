@@ -63,7 +63,7 @@ def test_build_writes_the_golden_files_byte_for_byte(case: str, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("case", "is_absolute"), [(case, number % 2 == 0) for number, case in enumerate(CASES)]
 )
-def test_the_files_do_not_depend_on_folder_spelling_of_the_path_or_hash_seed(
+def test_files_do_not_depend_on_folder_path_spelling_or_hash_seed(
     case: str, tmp_path: Path, *, is_absolute: bool
 ) -> None:
     file, *options = CASES[case]
@@ -79,12 +79,12 @@ def test_building_over_an_earlier_build_leaves_the_same_files(
     case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(HERE.parents[1])
-    for other in (
+    for earlier_case in (
         "autonomous_robot",
         "my_robot",
         case,
     ):  # the first has a parameter file that the others have not
-        file, *options = CASES[other]
+        file, *options = CASES[earlier_case]
         tfcompose("build", f"robots/{file}", *options, "-o", tmp_path)
     assert contents(tmp_path) == contents(HERE / case)
 

@@ -116,7 +116,7 @@ NOTICES: tuple[Notice, ...] = (
 
 
 def process(name: str, state: str, **more: object) -> ProcessStatus:
-    known: dict[str, object] = {
+    defaults: dict[str, object] = {
         "kind": "run",
         "host": None,
         "detail": "",
@@ -132,7 +132,7 @@ def process(name: str, state: str, **more: object) -> ProcessStatus:
         "live": 0,
         "nodes": (),
     }
-    return ProcessStatus(name=name, state=state, **{**known, **more})  # type: ignore[arg-type]
+    return ProcessStatus(name=name, state=state, **{**defaults, **more})  # type: ignore[arg-type]
 
 
 STATUS = RobotStatus(

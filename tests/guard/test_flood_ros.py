@@ -23,7 +23,7 @@ def sent(data: bytes) -> TFData:
     return TFData(Received(data, b"x", 0, 0, 1), static=False)
 
 
-def test_a_moment_of_reading_ends_after_its_time_and_a_second_has_so_much_of_it(
+def test_reading_stops_after_its_slice_of_a_second(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     times = count()
@@ -46,7 +46,7 @@ def test_a_moment_of_reading_ends_after_its_time_and_a_second_has_so_much_of_it(
     assert reader.is_reading
 
 
-def test_the_declared_edges_of_a_flood_are_taken_and_further_messages_skipped_meanwhile() -> None:
+def test_a_flood_keeps_its_declared_edges_and_skips_further_messages() -> None:
     reader = FloodReader({"odom"})
     parts = [decode(LONG), decode(DECLARED)]
     reader.add(sent(encode([*parts[0], *parts[1]])))
@@ -54,6 +54,6 @@ def test_the_declared_edges_of_a_flood_are_taken_and_further_messages_skipped_me
     assert reader.skipped == 1
     seconds = count()
     while reader.is_reading:
-        found = reader.read(float(next(seconds)))
-    assert found
-    assert [transform.child for transform in decode(found.received.data)] == ["odom"]
+        message = reader.read(float(next(seconds)))
+    assert message
+    assert [transform.child for transform in decode(message.received.data)] == ["odom"]

@@ -205,7 +205,7 @@ def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(faulty: Running) -
 
 
 @of_one_robot
-def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twice(
+def test_a_killed_guard_returns_with_its_memory_and_repeats_nothing(
     faulty: Running,
 ) -> None:
     faulty.joins("/first", "map odom")
@@ -242,7 +242,7 @@ with open_node("mounts", "/") as node:
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(
+def test_an_owner_that_replaced_an_unheard_latched_edge_is_named(
     up: Callable[[str], Running],
 ) -> None:
     mounts = "  camera: {parent: base_link, owner: mounts, static: true}\n"
@@ -264,7 +264,7 @@ def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(
 TRAITOR = NODE.replace("for edge in edges]", "for edge in edges[: 1 + os.path.exists('lie')]]")
 
 
-def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
+def test_policy_stop_offender_stops_own_offenders_and_no_strangers(
     up: Callable[[str], Running], tmp_path: Path
 ) -> None:
     (tmp_path / "traitor.py").write_text(TRAITOR, encoding="utf-8")
@@ -344,7 +344,7 @@ GUARDS = ["mode: watch", "mode: strict, fence: partition"]
 @pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.parametrize("guard", GUARDS)
-def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_plain_listener(
+def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little(
     up: Callable[[str], Running], guard: str
 ) -> None:
     robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
@@ -383,7 +383,7 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_p
 @pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.parametrize("guard", GUARDS)
-def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_received(
+def test_static_publishers_beyond_a_listeners_depth_are_all_received(
     up: Callable[[str], Running], guard: str
 ) -> None:
     foreign = processes.start([sys.executable, "-c", MANY], stdout=subprocess.PIPE)

@@ -97,8 +97,8 @@ def test_a_live_guard_names_owners_and_strangers_on_zenoh(
     assert "TF80" not in robot.output, "nobody is blamed who sends what is theirs"
     rogue = peer("/rogue", "map", "odom")
     robot.until_says("TF801")
-    found = next(line for line in robot.lines if "TF801" in line)
-    assert "/rogue" in found, found
+    line = next(line for line in robot.lines if "TF801" in line)
+    assert "/rogue" in line, line
     rogue.close()
     slam.close()
     assert until(lambda: any("TF804" in line and "map → odom" in line for line in robot.lines)), (

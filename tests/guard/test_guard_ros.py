@@ -182,10 +182,10 @@ def test_an_owner_that_falls_silent_is_named_and_when_it_is_back(robot: RunningR
     drive = robot.child("base_drive")
     silent = ("TF804", "base_drive (/diff_drive_controller)", "odom → base_link")
     back = ("over", "odom → base_link", "back")
-    known, over = len(robot.lines(*silent)), len(robot.lines(*back))
+    silences, over = len(robot.lines(*silent)), len(robot.lines(*back))
     drive.send_signal(signal.SIGSTOP)
     try:
-        robot.says(*silent, times=known + 1)
+        robot.says(*silent, times=silences + 1)
     finally:
         drive.send_signal(signal.SIGCONT)
     robot.says(*back, times=over + 1)

@@ -77,7 +77,7 @@ def test_an_external_owner_that_is_there_before_the_start_is_right(history: Hist
     assert Live("drive", ("base",)) in history.events
 
 
-def test_a_restarted_owner_is_right_also_while_its_old_publisher_is_still_in_the_graph(
+def test_a_restarted_owner_is_right_while_its_old_publisher_lingers(
     running: History,
 ) -> None:
     for _ in range(4):
@@ -104,7 +104,7 @@ def test_an_owner_may_send_other_edges_that_are_allowed() -> None:
         max_size=40,
     )
 )
-def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_names_delayed(
+def test_rightful_messages_give_no_finding_in_any_order_with_late_names(
     sends: list[tuple[str, float, float]],
 ) -> None:
     running = History().clear()
@@ -115,8 +115,8 @@ def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_na
         if node not in publishers:
             publishers[node] = running.joins(None, static=node == "/static")
             named.append((running.now + delay, publishers[node], node))
-        for at, publisher, name in named:
-            publisher.node = name if running.now >= at else publisher.node
+        for time_s, publisher, name in named:
+            publisher.node = name if running.now >= time_s else publisher.node
         running.send(
             publishers[node], edges[node], ago=min(delay, running.now - 1000 - SETTLE_S - TICK_S)
         ).wait(pause)
@@ -132,12 +132,12 @@ def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_na
 def test_a_foreign_publisher_is_named_once_and_at_the_next_check(running: History) -> None:
     rogue = running.joins("/rogue")
     running.send(rogue, "map odom").wait(TICK_S).repeat(rogue, "map odom", 100)
-    (finding,) = running.found()
+    (finding,) = running.findings()
     expect(finding, "TF801", "map → odom", "/rogue", "slam (/slam)", "rover.yaml:7")
     assert finding.severity == "error"
 
 
-def test_a_foreign_publisher_that_ended_is_reported_to_have_and_is_reported_when_it_comes_again(
+def test_a_foreign_publisher_that_ends_and_returns_is_reported_each_time(
     running: History,
 ) -> None:
     rogue = running.joins("/rogue")
@@ -146,56 +146,56 @@ def test_a_foreign_publisher_that_ended_is_reported_to_have_and_is_reported_when
     (over,) = running.wait(4).over()
     assert words_of(over) >= {"map", "odom", "/rogue"}
     running.repeat(running.joins("/rogue"), "map odom", 5)
-    assert len(running.found()) == 2
+    assert len(running.findings()) == 2
 
 
-def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(
+def test_a_foreign_publisher_that_sends_every_5_s_is_reported_once(
     running: History,
 ) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "map odom", 10, every=5)
-    assert len(running.found()) == 1
+    assert len(running.findings()) == 1
     assert running.all(RecoveredShown) == []
     assert len(running.wait(31).all(RecoveredShown)) == 1
 
 
-def test_a_foreign_publisher_that_pauses_for_long_is_reported_again_when_it_goes_on(
+def test_a_foreign_publisher_is_reported_again_after_a_long_pause(
     running: History,
 ) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "map odom", 5).wait(40).repeat(rogue, "map odom", 5)
-    assert (len(running.found()), len(running.all(RecoveredShown))) == (2, 1)
+    assert (len(running.findings()), len(running.all(RecoveredShown))) == (2, 1)
 
 
 def test_a_latched_offence_lasts_while_its_publisher_does(running: History) -> None:
     rogue = running.joins("/rogue", static=True)
     running.send(rogue, "base lidar").wait(120)
-    assert (len(running.found()), running.all(RecoveredShown)) == (1, [])
+    assert (len(running.findings()), running.all(RecoveredShown)) == (1, [])
     running.leaves(rogue)
     assert len(running.wait(4).all(RecoveredShown)) == 1
 
 
-def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_message_of_its_own(
+def test_many_edges_of_one_node_are_one_finding_even_in_separate_messages(
     running: History,
 ) -> None:
     rogue = running.joins("/rogue", static=True)
     running.send(rogue, "base lidar").send(rogue, "base camera").wait(TICK_S)
-    (finding,) = running.found()
+    (finding,) = running.findings()
     expect(finding, "TF801", "base → lidar and 1 more", "/rogue", "static (/static)")
     assert [note.message for note in finding.notes][:2] == ["base → lidar", "base → camera"]
 
 
-def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood_together(
+def test_later_edges_of_an_offender_are_reported_and_a_floods_at_once(
     running: History,
 ) -> None:
     rogue = running.joins("/rogue")
     for n in range(100):
         running.send(rogue, f"base thing_{n}").wait(0.02)
     running.wait(1)
-    assert 2 <= len(running.found()) <= 6
-    assert len(running.found()[1].notes) <= 13
+    assert 2 <= len(running.findings()) <= 6
+    assert len(running.findings()[1].notes) <= 13
     running.send(rogue, "map odom").wait(TICK_S)
-    assert running.found()[-1].code == "TF801"
+    assert running.findings()[-1].code == "TF801"
 
 
 @pytest.mark.parametrize(
@@ -241,7 +241,7 @@ def test_an_undeclared_edge_is_reported_as_the_policy_says(
 ) -> None:
     running = History(GuardPolicy(unknown_edges=policy)).clear()  # type: ignore[arg-type]
     running.repeat(running.joins("/tracker"), "map person", 10)
-    assert [(finding.code, finding.severity) for finding in running.found()] == [
+    assert [(finding.code, finding.severity) for finding in running.findings()] == [
         ("TF803", severity) for severity in severities
     ]
 
@@ -250,18 +250,18 @@ def test_only_undeclared_edges_that_no_pattern_allows_are_reported() -> None:
     running = History(GuardPolicy(allow=(EdgePattern("map", "person_*"),))).clear()
     tracker = running.joins("/tracker")
     running.repeat(tracker, "map person_1, odom person_2, map person", 3)
-    (finding,) = running.found()
+    (finding,) = running.findings()
     expect(finding, "TF803", "odom → person_2 and 1 more", "/tracker")
     assert [note.message for note in finding.notes] == ["odom → person_2", "map → person"]
 
 
-def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(
+def test_a_volatile_writer_of_static_edges_is_reported_once_with_its_edges(
     running: History,
 ) -> None:
     running.joins("/static", static=True, volatile=True)
     running.joins("/slam", volatile=True)
     running.wait(5)
-    (finding,) = running.found()
+    (finding,) = running.findings()
     expect(finding, "TF806", "/static", "/tf_static", "base → lidar")
 
 
@@ -275,16 +275,16 @@ def test_an_owner_that_replaced_an_unheard_latched_edge_is_reported_once(
     running.send(static, "base camera").wait(1)
     assert running.reports() == []
     running.wait(5)
-    (finding,) = running.found()
+    (finding,) = running.findings()
     expect(finding, "TF850", "/static", "1 message", "/tf_static", "base → lidar")
     assert finding.severity == "warning"
     running.dies()
     running.wait(10)
-    assert running.found() == []
+    assert running.findings() == []
 
 
 @pytest.mark.parametrize("edges", ["base lidar, base camera", "base camera"])
-def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_nothing(
+def test_an_owner_replaced_nothing_if_all_its_latched_messages_were_heard(
     edges: str,
 ) -> None:
     running = History().clear()
@@ -295,7 +295,7 @@ def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_not
     assert running.reports() == []
 
 
-def test_of_who_has_new_frames_again_and_again_is_reported_ever_more_rarely_and_of_all_of_them(
+def test_a_source_of_ever_new_frames_is_reported_ever_more_rarely(
     running: History,
 ) -> None:
     """A tracker that names its frames after what it sees: tag_1, tag_2, ….

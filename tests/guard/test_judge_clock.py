@@ -13,19 +13,19 @@ def stamped(running: History, publisher: Publisher, edges: str, stamps: list[flo
     return running
 
 
-def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_right_again(
+def test_an_owner_with_a_wrong_clock_is_reported_and_so_is_its_recovery(
     running: History,
 ) -> None:
     slam = running.joins("/slam")
     stamped(running, slam, "map odom", [5 + n / 10 for n in range(10)])
-    (finding,) = running.found()
+    (finding,) = running.findings()
     expect(finding, "TF825", "/slam", "map → odom", "stamped 5.", "simulated")
     assert finding.severity == "error"
     for _ in range(40):
         running.send(slam, "map odom", stamp_s=wall(running)).wait(0.1)
     (over,) = running.over()
     assert words_of(over) >= {"/slam", "map", "odom"}
-    assert len(running.found()) == 1
+    assert len(running.findings()) == 1
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_a_clock_that_is_more_than_ten_seconds_off_is_wrong(
     slam = running.joins("/slam")
     for _ in range(10):
         running.send(slam, "map odom", stamp_s=0 if off is None else wall(running) + off).wait(0.1)
-    assert [finding.code for finding in running.found() if finding.code != "TF823"] == (
+    assert [finding.code for finding in running.findings() if finding.code != "TF823"] == (
         ["TF825"] if reports else []
     )
     assert not reports or reports in running.reports()[0]
@@ -54,11 +54,11 @@ def test_one_stray_stamp_is_no_wrong_clock(running: History) -> None:
     slam = running.joins("/slam")
     for n in range(50):
         running.send(slam, "map odom", stamp_s=wall(running) - 100 * (n % 10 == 0)).wait(0.1)
-    assert "TF825" not in {finding.code for finding in running.found()}
+    assert "TF825" not in {finding.code for finding in running.findings()}
 
 
 @pytest.mark.parametrize("off", [0.0, -60.0])
-def test_what_waited_while_the_guard_was_kept_from_running_reports_nothing_of_its_senders_clock(
+def test_messages_that_waited_for_a_paused_guard_accuse_no_senders_clock(
     running: History, off: float
 ) -> None:
     slam = running.joins("/slam")
@@ -70,12 +70,12 @@ def test_what_waited_while_the_guard_was_kept_from_running_reports_nothing_of_it
     assert running.check().reports() == []
     for _ in range(60):
         running.send(slam, "map odom", stamp_s=wall(running) + off).wait(0.1)
-    assert [finding.code for finding in running.found() if finding.code != "TF824"] == (
+    assert [finding.code for finding in running.findings() if finding.code != "TF824"] == (
         ["TF825"] if off else []
     )
 
 
-def test_in_simulated_time_the_systems_time_is_the_wrong_one_and_clock_decides() -> None:
+def test_in_simulated_time_the_system_time_is_wrong_and_clock_decides() -> None:
     running = History(clock="sim").clear()
     slam, drive = running.joins("/slam"), running.joins("/drive")
     for n in range(20):
@@ -110,11 +110,11 @@ def test_where_simulated_time_goes_slowly_rates_are_judged_by_it(
             running.judge.clock(round(sim_s * 1e9), running.now)
             running.send(drive, "odom base", stamp_s=sim_s).wait(every_s)
             sim_s += speed * every_s
-    assert [finding.code for finding in running.found()] == codes
+    assert [finding.code for finding in running.findings()] == codes
 
 
 @pytest.mark.parametrize(("sent", "codes"), [(True, []), (False, ["TF804"])])
-def test_nobody_is_silent_while_simulated_time_stands_unless_nobody_is_there_who_sends_it(
+def test_no_owner_is_silent_in_paused_time_unless_the_clock_sender_is_gone(
     *, sent: bool, codes: list[str]
 ) -> None:
     """A simulator that is paused, twice, and one that has crashed."""
@@ -127,12 +127,12 @@ def test_nobody_is_silent_while_simulated_time_stands_unless_nobody_is_there_who
             sim_s += 0.05
         running.judge.clocks.sent = sent or not paused_s
         running.wait(paused_s)
-    assert [finding.code for finding in running.found()][:1] == codes
+    assert [finding.code for finding in running.findings()][:1] == codes
     for _ in range(40):  # time goes on, and the owner does not
         running.judge.clock(round(sim_s * 1e9), running.now)
         running.wait(0.05)
         sim_s += 0.05
-    assert running.found()[-1].code == "TF804"
+    assert running.findings()[-1].code == "TF804"
 
 
 def test_simulated_time_that_begins_again_takes_the_stamps_with_it() -> None:
@@ -151,10 +151,10 @@ def test_a_clock_that_is_read_twice_at_one_time_takes_no_stamps_with_it() -> Non
         for _ in range(2):
             running.judge.clock(round((20 + n / 10) * 1e9), running.now)
         running.send(drive, "odom base", stamp_s=20 + n // 20).wait(0.1)
-    assert [finding.code for finding in running.found()] == ["TF823"]
+    assert [finding.code for finding in running.findings()] == ["TF823"]
 
 
-def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing(
+def test_only_a_steadily_repeated_stamp_is_a_warning(
     running: History,
 ) -> None:
     slam, drive = running.joins("/slam"), running.joins("/drive")
@@ -177,11 +177,11 @@ def test_stamps_that_go_back_are_a_warning_if_far_or_often(
     for step in steps:
         stamps += [stamps[-1] + step, stamps[-1]]
     stamped(running, slam, "map odom, base camera", stamps)
-    assert [finding.code for finding in running.found() if finding.code != "TF801"] == codes
+    assert [finding.code for finding in running.findings() if finding.code != "TF801"] == codes
 
 
 def test_the_stamps_of_fixed_edges_and_of_strangers_are_not_judged(running: History) -> None:
     static, rogue = running.joins("/static", static=True), running.joins("/rogue")
     for _ in range(10):
         running.send(static, FIXED, stamp_s=0).send(rogue, "map odom", stamp_s=0).wait(0.1)
-    assert [finding.code for finding in running.found()] == ["TF801"]
+    assert [finding.code for finding in running.findings()] == ["TF801"]

@@ -74,7 +74,7 @@ def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: Hist
     assert [len(event.children) for event in running.all(Live) if isinstance(event, Live)] == [99]
 
 
-def test_each_edge_has_its_publisher_rate_age_and_delay_and_none_before_it_came() -> None:
+def test_each_edge_has_publisher_rate_age_and_delay_once_it_arrives() -> None:
     rated = tuple(
         replace(planned, rate=10.0) if planned.owner == "slam" else planned for planned in EDGES
     )
@@ -155,7 +155,7 @@ def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
     history = History(claims=(PlanClaim("/diff", "odom", "base", "x: false"),)).clear()
     history.repeat(history.joins("/other"), "odom base", 10)
     history.repeat(history.joins("/diff"), "map odom", 10)
-    assert [("set" in finding.help) for finding in history.found()] == [False, False]
+    assert [("set" in finding.help) for finding in history.findings()] == [False, False]
 
 
 def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: History) -> None:
@@ -182,7 +182,7 @@ def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: H
     expect(running.only(), "TF801", "map → odom", "/other", "slam (/slam)")
 
 
-def test_a_judge_that_follows_another_does_not_miss_whom_it_has_not_found_yet(
+def test_a_successor_judge_does_not_miss_publishers_not_yet_discovered(
     running: History,
 ) -> None:
     running = History(
@@ -206,7 +206,7 @@ def test_a_judge_that_follows_another_does_not_miss_whom_it_has_not_found_yet(
     assert sorted(line[:10] for line in running.reports()) == ["TF804 slam", "TF804 stat"]
 
 
-def test_an_owner_that_was_silent_is_not_reported_to_be_again_and_is_back_when_it_is() -> None:
+def test_a_silent_owner_is_not_reported_again_but_its_return_is() -> None:
     running = History(edges=(edge("map odom", "slam", rate=10.0),)).clear()
     slam = running.joins("/slam")
     running.repeat(slam, "map odom", 30).wait(2)
@@ -221,16 +221,16 @@ def test_an_owner_that_was_silent_is_not_reported_to_be_again_and_is_back_when_i
     )
 
 
-def test_a_namesake_is_still_distinguished_from_the_owner_after_the_guard_died(
+def test_a_namesake_remains_distinct_from_the_owner_after_the_guard_died(
     running: History,
 ) -> None:
-    slam, other = running.joins("/slam"), running.joins("/slam")
+    slam, namesake = running.joins("/slam"), running.joins("/slam")
     running.repeat(slam, "map odom", 5).dies()
-    running.send(other, "map odom").repeat(slam, "map odom", 5)
-    expect(running.found()[0], "TF801", "map → odom", "another /slam")
+    running.send(namesake, "map odom").repeat(slam, "map odom", 5)
+    expect(running.findings()[0], "TF801", "map → odom", "another /slam")
 
 
-def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has_a_name(
+def test_a_message_passes_only_if_its_sender_has_a_name_and_owns_all_of_it(
     running: History,
 ) -> None:
     slam = running.joins(None)
@@ -252,9 +252,7 @@ def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has
 @pytest.mark.parametrize(
     ("process", "stopped"), [("slam", "slam"), ("", ""), (None, ""), ("drive", "")]
 )
-def test_only_a_process_that_is_proven_to_have_done_it_can_be_stopped_for_it(
-    process: str | None, stopped: str
-) -> None:
+def test_only_a_proven_offender_can_be_stopped(process: str | None, stopped: str) -> None:
     """A node's name proves nothing: whoever has it may be of another run, or of no ROS at all."""
     processes = (
         PlanProcess("slam", "run", nodes=("/slam",)),
@@ -262,25 +260,25 @@ def test_only_a_process_that_is_proven_to_have_done_it_can_be_stopped_for_it(
     )
     running = History(GuardPolicy(on_violation="stop-offender"), processes).clear()
     running.repeat(running.joins("/slam", process=process), "odom base", 5)
-    (found,) = [event for event in running.events if isinstance(event, FindingShown)]
-    assert (found.found.code, found.process) == ("TF801", stopped)
-    assert bool(found.found.notes) is True
+    (event,) = [event for event in running.events if isinstance(event, FindingShown)]
+    assert (event.found.code, event.process) == ("TF801", stopped)
+    assert bool(event.found.notes) is True
 
 
 @pytest.mark.parametrize(
     ("process", "edges", "ours"),
     [("slam", "map odom", True), ("slam", "odom base", False), ("", "map odom", False)],
 )
-def test_an_owner_whose_node_has_another_name_is_advised_to_declare_it_and_not_to_end_itself(
+def test_an_owner_under_another_name_is_advised_to_declare_it(
     process: str, edges: str, *, ours: bool
 ) -> None:
     processes = [PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")]
     running = History(processes=tuple(processes)).clear()
-    other = running.joins("/other")
-    running.send(other, edges)
-    writer = Publisher(other.gid, "/other", static=False, ours=True, process=process)
+    renamed = running.joins("/other")
+    running.send(renamed, edges)
+    writer = Publisher(renamed.gid, "/other", static=False, ours=True, process=process)
     running.judge.graph([writer], running.now)
-    (found,) = running.judge.tick(running.now + 0.2)
-    assert isinstance(found, FindingShown)
-    assert (found.found.code, "node: /other" in found.found.help) == ("TF801", ours)
-    assert found.found.help.startswith("stop /other") is not ours
+    (event,) = running.judge.tick(running.now + 0.2)
+    assert isinstance(event, FindingShown)
+    assert (event.found.code, "node: /other" in event.found.help) == ("TF801", ours)
+    assert event.found.help.startswith("stop /other") is not ours

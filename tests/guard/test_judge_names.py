@@ -13,7 +13,14 @@ from tests.support.guard_history import Publisher as Publishes
 from tfcompose.foundation.findings import Finding
 from tfcompose.guard.judge import Judge
 from tfcompose.guard.verdict.publishers import unfenced_finding
-from tfcompose.model.messages import Clear, FindingShown, Live, RecoveredShown, Taken, Unfenced
+from tfcompose.model.messages import (
+    Clear,
+    EdgeTaken,
+    FilterBypassed,
+    FindingShown,
+    Live,
+    RecoveredShown,
+)
 from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import OtherRun, Publisher
 from tfcompose.tf.live.state import NAMELESS, NO_NODE
@@ -39,7 +46,7 @@ def test_an_owner_whose_name_comes_after_seconds_is_not_blamed(running: History)
     assert Live("slam", ("odom",)) in running.events
 
 
-def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_is_known(
+def test_an_unnamed_publisher_of_an_owned_edge_is_reported_within_1_s(
     running: History,
 ) -> None:
     slam, stranger = running.joins("/slam"), running.joins(None)
@@ -48,14 +55,14 @@ def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_
     expect(running.only(), "TF801", "map → odom", NAMELESS, "slam (/slam)")
 
 
-def test_a_publisher_that_gets_its_name_late_is_named_once_and_has_not_ended(
+def test_a_publisher_with_a_late_name_is_named_once_and_has_not_ended(
     running: History,
 ) -> None:
     slam, stranger = running.joins("/slam"), running.joins(None)
     running.send(slam, "map odom").repeat(stranger, "map odom", 15)
     stranger.node = "/rogue"
     running.repeat(stranger, "map odom", 350)
-    first, second = running.found()
+    first, second = running.findings()
     expect(first, "TF801", NAMELESS)
     expect(second, "TF801", "/rogue;")
     assert running.all(RecoveredShown) == []
@@ -63,7 +70,7 @@ def test_a_publisher_that_gets_its_name_late_is_named_once_and_has_not_ended(
 
 def test_a_publisher_that_never_gets_a_name_is_reported_at_last(running: History) -> None:
     running.repeat(running.joins(None), "map odom", 60)
-    assert [finding.code for finding in running.found()] == ["TF801"]
+    assert [finding.code for finding in running.findings()] == ["TF801"]
 
 
 def test_a_publisher_that_sends_once_and_leaves_is_named(running: History) -> None:
@@ -72,9 +79,7 @@ def test_a_publisher_that_sends_once_and_leaves_is_named(running: History) -> No
     assert "/rogue" in running.send(rogue, "map odom").wait(TICK_S).reports()[0]
 
 
-def test_two_publishers_of_one_name_that_alternate_are_reported_and_the_edge_is_not_silent() -> (
-    None
-):
+def test_two_namesakes_that_alternate_are_reported_and_the_edge_is_live() -> None:
     rated = tuple(
         replace(planned, rate=10.0) if planned.owner == "slam" else planned for planned in EDGES
     )
@@ -101,7 +106,7 @@ def test_two_that_latch_alternately_may_be_one_owner_that_is_heard_again() -> No
     assert running.reports() == []
 
 
-def test_a_second_static_process_is_reported_while_both_are_there_and_over_when_it_has_left(
+def test_a_second_static_process_is_reported_until_it_leaves(
     running: History,
 ) -> None:
     first, second = (running.joins("/static", static=True) for _ in range(2))
@@ -125,7 +130,7 @@ def test_a_static_owner_that_leaves_is_reported_once(running: History) -> None:
     static = running.joins("/static", static=True)
     running.send(static, FIXED).wait(1).leaves(static)
     running.wait(10)
-    assert [finding.code for finding in running.found()] == ["TF804"]
+    assert [finding.code for finding in running.findings()] == ["TF804"]
 
 
 def test_without_ids_nobody_is_blamed_where_the_owner_may_have_sent_it() -> None:
@@ -136,9 +141,7 @@ def test_without_ids_nobody_is_blamed_where_the_owner_may_have_sent_it() -> None
     assert running.reports() == []
 
 
-def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobody_was_first() -> (
-    None
-):
+def test_without_ids_one_suspect_is_blamed_once_and_no_node_was_first() -> None:
     running = History(gids=False)
     drive = running.joins("/drive")
     running.repeat(drive, "odom base", 20)
@@ -148,11 +151,11 @@ def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobod
     running.joins("/late")
     running.repeat(rogue, "map odom", 20)
     expect(running.only(), "TF801", "map → odom", "one of /drive, /rogue;", "slam (/slam)")
-    assert running.all(Taken) == []
+    assert running.all(EdgeTaken) == []
 
 
 def test_ids_that_do_not_say_whose_they_are_distinguish_two_that_alternate() -> None:
-    running = History(says_who=False).clear()
+    running = History(gid_identifies_node=False).clear()
     slam, rogue = running.joins("/slam"), running.joins("/rogue")
     running.repeat(slam, "map odom", 5)
     for _ in range(20):
@@ -165,7 +168,7 @@ def test_ids_that_do_not_say_whose_they_are_distinguish_two_that_alternate() -> 
 
 def test_without_ids_a_newcomer_is_one_of_those_that_may_have_sent_it() -> None:
     """Messages of a newcomer can be heard before the graph shows it."""
-    running = History(says_who=False).clear()
+    running = History(gid_identifies_node=False).clear()
     slam, rogue = running.joins("/slam"), running.joins("/rogue", hidden=True)
     running.joins("/drive")
     running.repeat(slam, "map odom", 5)
@@ -176,10 +179,8 @@ def test_without_ids_a_newcomer_is_one_of_those_that_may_have_sent_it() -> None:
     expect(running.only(), "TF801", "map → odom", "one of /drive, /rogue, /slam;", "slam (/slam)")
 
 
-def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_started_anew() -> (
-    None
-):
-    running = History(says_who=False).clear()
+def test_unassignable_ids_blame_no_owner_and_no_restarted_node() -> None:
+    running = History(gid_identifies_node=False).clear()
     slam, drive = running.joins("/slam"), running.joins("/drive")
     static = running.joins("/static", static=True)
     running.send(static, "base lidar", static=True)
@@ -196,11 +197,11 @@ def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_st
 
 
 def test_without_ids_all_who_may_have_sent_a_foreign_edge_are_named() -> None:
-    running = History(says_who=False).clear()
+    running = History(gid_identifies_node=False).clear()
     drive, rogue = running.joins("/drive"), running.joins("/rogue")
     for _ in range(30):
         running.send(drive, "odom base").send(rogue, "map odom, base cup").wait(0.1)
-    first, second = running.found()
+    first, second = running.findings()
     expect(first, "TF801", "map → odom", "one of /drive, /rogue;")
     expect(second, "TF803", "base → cup", "one of /drive, /rogue,")
 
@@ -209,7 +210,7 @@ def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:
     running = History(gids=False).clear()
     running.joins("/slam_toolbox")
     running.repeat(running.joins("/other"), "map odom", 10)
-    assert [finding.code for finding in running.found()] == ["TF801"]
+    assert [finding.code for finding in running.findings()] == ["TF801"]
 
 
 # Two with the owner's name: which is the owner is proven by processes, not by names.
@@ -233,17 +234,17 @@ def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
         running.joins(node, static=static, process=process),
         running.joins(node, static=static, process=owner),
     ]
-    other, own = pair
-    running.repeat(other, edges, 3) if foreign_first else running.check()
+    namesake, owner_publisher = pair
+    running.repeat(namesake, edges, 3) if foreign_first else running.check()
     for _ in range(10):
-        running.send(own, edges)
+        running.send(owner_publisher, edges)
         assert running.admitted is None, "the owner's messages pass"
-        running.send(other, edges).wait(0.1)
+        running.send(namesake, edges).wait(0.1)
         assert running.admitted == frozenset(), "the other's do not"
-    found = [event for event in running.events if isinstance(event, FindingShown)]
-    assert {event.found.code for event in found} == {"TF801"}
-    assert {event.process for event in found} == ({"joints"} if process == "joints" else {""})
-    expect(found[0].found, "TF801", f"another {node}")
+    events = [event for event in running.events if isinstance(event, FindingShown)]
+    assert {event.found.code for event in events} == {"TF801"}
+    assert {event.process for event in events} == ({"joints"} if process == "joints" else {""})
+    expect(events[0].found, "TF801", f"another {node}")
 
 
 def test_a_child_with_a_stopped_owners_name_is_not_the_owner() -> None:
@@ -258,25 +259,23 @@ def test_a_child_with_a_stopped_owners_name_is_not_the_owner() -> None:
     expect(running.only(), "TF801", "another /slam")
 
 
-def test_an_owner_that_is_started_again_is_the_owner_and_one_that_runs_out_of_sight_is_too() -> (
-    None
-):
+def test_a_restarted_owner_is_the_owner_even_out_of_sight() -> None:
     for before, after in (("slam", "slam"), (None, None), ("", "")):
         running = History().clear()
         slam = running.joins("/slam", process=before)
         running.repeat(slam, "map odom", 5)
         running.leaves(slam)
         running.repeat(running.joins("/slam", process=after), "map odom", 5)
-        assert running.found() == []
+        assert running.findings() == []
 
 
 def test_an_external_owner_may_be_started_by_another_process_of_the_plan() -> None:
     running = History().clear()
     running.repeat(running.joins("/drive", process="slam"), "odom base", 5)
-    assert running.found() == []
+    assert running.findings() == []
 
 
-def test_a_program_without_ros_is_called_one_and_not_by_what_the_middleware_calls_it() -> None:
+def test_a_program_without_ros_is_called_so_despite_its_middleware_name() -> None:
     running = History().clear()
     running.repeat(running.joins(NO_NODE, process=""), "map odom", 3)
     finding = running.only()
@@ -314,7 +313,7 @@ def identity(process: str, *, fenced: bool, profile: str = "") -> Identity:
         ([{"RUN": "1", "P": "a"}, {"RUN": "1", "P": "b"}], Identity(ours=True)),
     ],
 )
-def test_the_environment_of_a_process_says_whose_it_is_and_whether_it_is_fenced(
+def test_a_process_environment_tells_its_owner_and_whether_it_is_fenced(
     environments: list[dict[str, str]] | None, expected: Identity
 ) -> None:
     assert RunMarks("RUN", "1", "P", "XML").identify(environments) == expected
@@ -322,11 +321,11 @@ def test_the_environment_of_a_process_says_whose_it_is_and_whether_it_is_fenced(
     assert without == replace(expected, fenced=None, profile="")
 
 
-def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_stopped() -> None:
+def test_a_process_past_the_fence_is_reported_for_stopping_once() -> None:
     running = History(GuardPolicy(mode="strict")).clear()
 
-    def left() -> list[Unfenced]:
-        return [event for event in running.events if isinstance(event, Unfenced)]
+    def left() -> list[FilterBypassed]:
+        return [event for event in running.events if isinstance(event, FilterBypassed)]
 
     for fenced, process in (
         (True, "slam"),
@@ -344,8 +343,8 @@ def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_s
     for _ in range(2):
         running.now += 1.0
         running.events += running.judge.graph([publisher], running.now)
-    (found,) = left()
-    assert (found.found.code, found.process) == ("TF852", "slam")
+    (event,) = left()
+    assert (event.found.code, event.process) == ("TF852", "slam")
 
 
 @pytest.mark.parametrize("fenced", [True, None, False])
@@ -357,22 +356,24 @@ def test_a_process_whose_environment_was_cleared_is_reported_by_its_number(
     for _ in range(3):
         running.now += 1.0
         running.events += running.judge.graph([publisher], running.now)
-    found = [event for event in running.events if isinstance(event, Unfenced)]
-    assert [(event.found.code, event.process, event.pid) for event in found] == (
+    events = [event for event in running.events if isinstance(event, FilterBypassed)]
+    assert [(event.found.code, event.process, event.pid) for event in events] == (
         [("TF852", "", 77)] if fenced is False else []
     )
 
 
-def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped() -> None:
+def test_edges_sent_past_the_fence_are_reported_before_the_stop() -> None:
     running = History(GuardPolicy(mode="strict")).clear()
     slam, renamed = running.joins("/slam"), running.joins("/slam")
     slam.ours, slam.process, slam.fenced = True, "slam", True
     renamed.ours, renamed.process, renamed.fenced = True, "drive", False
     running.check().send(slam, "map odom").send(renamed, "map odom").check()
-    found = [
-        event.found.code for event in running.events if isinstance(event, (FindingShown, Unfenced))
+    codes = [
+        event.found.code
+        for event in running.events
+        if isinstance(event, (FindingShown, FilterBypassed))
     ]
-    assert found == ["TF801", "TF852"]
+    assert codes == ["TF801", "TF852"]
 
 
 @pytest.mark.parametrize(
@@ -407,7 +408,7 @@ def test_when_a_stranger_has_left_its_latched_edges_stay_with_listeners(
 OTHER = OtherRun("other@0", 4711, "14:03:27")
 
 
-def test_what_another_robot_publishes_is_one_finding_that_names_it_and_the_ways_out() -> None:
+def test_edges_of_another_robot_are_one_finding_with_its_name_and_ways_out() -> None:
     running = History().clear()
     slam, wheels = running.joins("/other/slam"), running.joins("/other/wheels")
     slam.run = wheels.run = OTHER
@@ -415,7 +416,7 @@ def test_what_another_robot_publishes_is_one_finding_that_names_it_and_the_ways_
         running.send(wheels, "cart left_wheel, cart right_wheel").send(
             slam, "map odom, odom cart"
         ).wait(0.1)
-    findings = running.found()
+    findings = running.findings()
     assert {finding.code for finding in findings} == {"TF854"}
     assert len(findings) <= 2, "a warning of its own frames, and an error of those that both have"
     expect(
@@ -432,15 +433,13 @@ def test_what_another_robot_publishes_is_one_finding_that_names_it_and_the_ways_
     assert any("other@0" in over for over in running.wait(10.0).over())
 
 
-def test_another_robot_with_frames_of_its_own_is_warned_of_and_keeps_nobody_from_starting() -> (
-    None
-):
+def test_another_robot_with_own_frames_is_a_warning_and_blocks_no_start() -> None:
     running = History()
     wheels = running.joins("/other/wheels")
     wheels.run = OTHER
     running.repeat(wheels, "cart left_wheel, cart right_wheel", 20)
     assert Clear() in running.events
-    assert [(finding.code, finding.severity) for finding in running.found()] == [
+    assert [(finding.code, finding.severity) for finding in running.findings()] == [
         ("TF854", "warning")
     ]
 
@@ -450,22 +449,22 @@ def test_another_robot_that_has_an_edge_of_the_plan_keeps_it_from_starting() -> 
     slam = running.joins("/other/slam")
     slam.run = OTHER
     running.repeat(slam, "map odom", 5)
-    (event,) = running.all(Taken)
-    assert isinstance(event, Taken)
+    (event,) = running.all(EdgeTaken)
+    assert isinstance(event, EdgeTaken)
     expect(event.found, "TF854", "other@0", "odom")
 
 
 def test_the_environment_of_another_robots_process_says_whose_run_it_is() -> None:
     marks = RunMarks("RUN", "rover@0:1", "P", launcher="L")
-    other = {"RUN": "other@0:7", "L": "4711:100", "P": "slam"}
-    found = marks.identify([other]).run
-    assert found is not None
-    assert (found.name, found.pid) == ("other@0", 4711)
-    own: list[dict[str, str]] = [other | {"RUN": "rover@0:1"}]
+    environment = {"RUN": "other@0:7", "L": "4711:100", "P": "slam"}
+    run = marks.identify([environment]).run
+    assert run is not None
+    assert (run.name, run.pid) == ("other@0", 4711)
+    own_environments: list[dict[str, str]] = [environment | {"RUN": "rover@0:1"}]
     unsure: list[list[dict[str, str]] | None] = [
-        [other, {}],
-        [other | {"L": ""}],
-        own,
+        [environment, {}],
+        [environment | {"L": ""}],
+        own_environments,
         [{}],
         [],
         None,
@@ -505,13 +504,13 @@ def test_each_of_three_namesakes_is_named_and_who_remains(mode: GuardMode, owner
     running = History(GuardPolicy(mode=mode)).clear()
     edges = {"slam": "map odom", "drive": "odom base"}[owner]
     process = owner if owner == "slam" else None
-    own = running.joins(f"/{owner}", process=process, pid=10)
-    send_all(running, [own], edges, 1.0)
+    owner_publisher = running.joins(f"/{owner}", process=process, pid=10)
+    send_all(running, [owner_publisher], edges, 1.0)
     namesakes = [running.joins(f"/{owner}", process="", pid=pid) for pid in (11, 12, 13)]
-    present = [own, *namesakes]
+    present = [owner_publisher, *namesakes]
     anybody = [10] if owner == "drive" else []
     send_all(running, present, edges, 2.0)
-    assert pids_of(running.found()[-1]) == [*anybody, 11, 12, 13]
+    assert pids_of(running.findings()[-1]) == [*anybody, 11, 12, 13]
     for ended, remaining in ((12, [11, 13]), (11, [13])):
         before = len(running.events)
         leaving = next(publisher for publisher in present if publisher.pid == ended)
@@ -523,9 +522,9 @@ def test_each_of_three_namesakes_is_named_and_who_remains(mode: GuardMode, owner
         expect(new[0], "TF801", f"another /{owner}", f"pid {ended}")
     assert running.over() == []
     running.leaves(namesakes[2])
-    before = len(running.found())
-    send_all(running, [own], edges, 5.0)
-    assert (len(running.over()), len(running.found())) == (1, before)
+    before = len(running.findings())
+    send_all(running, [owner_publisher], edges, 5.0)
+    assert (len(running.over()), len(running.findings())) == (1, before)
 
 
 @pytest.mark.parametrize("mode", ["watch", "strict"])
@@ -535,7 +534,7 @@ def test_of_ten_strangers_and_ten_namesakes_each_is_named(mode: GuardMode) -> No
     rogues = [running.joins(f"/rogue_{pid}", process="", pid=pid) for pid in range(20, 30)]
     rogues += [running.joins("/slam", process="", pid=pid) for pid in range(30, 40)]
     send_all(running, [slam, *rogues], "map odom", 2.0)
-    for findings in (running.found(), running.judge.wrong()):
+    for findings in (running.findings(), running.judge.wrong()):
         assert sorted(pid for finding in findings for pid in pids_of(finding)) == [*range(20, 40)]
         assert len(findings) == 11
 
@@ -545,31 +544,31 @@ def test_namesakes_that_come_one_after_the_other_are_all_named_in_the_end(
     running: History, owner: str, process: str | None
 ) -> None:
     edges = {"slam": "map odom", "drive": "odom base"}[owner]
-    there = [running.joins(f"/{owner}", process=process, pid=10)]
+    publishers = [running.joins(f"/{owner}", process=process, pid=10)]
     for pid in range(30, 40):
-        there.append(running.joins(f"/{owner}", process="", pid=pid))
-        send_all(running, there, edges, 0.5)
-    send_all(running, there, edges, 20.0)
+        publishers.append(running.joins(f"/{owner}", process="", pid=pid))
+        send_all(running, publishers, edges, 0.5)
+    send_all(running, publishers, edges, 20.0)
     anybody = [10] if process is None else []
-    assert pids_of(running.found()[-1]) == [*anybody, *range(30, 40)]
-    assert len(running.found()) < 10, "they are collected"
+    assert pids_of(running.findings()[-1]) == [*anybody, *range(30, 40)]
+    assert len(running.findings()) < 10, "they are collected"
     assert running.over() == []
 
 
 def test_an_edge_is_over_when_no_publisher_of_that_name_sends_it(
     running: History,
 ) -> None:
-    first, other = (running.joins("/rogue", process="", pid=pid) for pid in (11, 12))
+    first, second = (running.joins("/rogue", process="", pid=pid) for pid in (11, 12))
     for _ in range(10):
-        running.send(first, "map odom").send(other, "map odom, odom base").wait(0.1)
-    assert [pids_of(finding) for finding in running.found()] == [[11, 12]]
-    running.leaves(other)
+        running.send(first, "map odom").send(second, "map odom, odom base").wait(0.1)
+    assert [pids_of(finding) for finding in running.findings()] == [[11, 12]]
+    running.leaves(second)
     send_all(running, [first], "map odom", 5.0)
     (over,) = running.over()
     assert words_of(over) >= {"odom", "base", "/rogue"}
     assert "map" not in words_of(over)
-    expect(running.found()[-1], "TF801", "map → odom", "pid 12")
-    assert pids_of(running.found()[-1]) == [11]
+    expect(running.findings()[-1], "TF801", "map → odom", "pid 12")
+    assert pids_of(running.findings()[-1]) == [11]
 
 
 def test_the_publishers_of_one_process_are_one(running: History) -> None:
@@ -577,11 +576,11 @@ def test_the_publishers_of_one_process_are_one(running: History) -> None:
         running.joins("/rogue", static=static, process="", pid=11) for static in (False, True)
     )
     running.send(fixed, "base lidar").repeat(moving, "base lidar", 5)
-    (finding,) = running.found()
+    (finding,) = running.findings()
     assert pids_of(finding) == [11]
     running.leaves(fixed)
     running.repeat(moving, "base lidar", 50)
-    assert (running.over(), len(running.found())) == ([], 1)
+    assert (running.over(), len(running.findings())) == ([], 1)
 
 
 def test_publishers_of_unknown_processes_on_two_topics_may_be_of_one(running: History) -> None:
@@ -596,20 +595,20 @@ def test_who_remains_is_known_to_the_guard_that_follows(
 ) -> None:
     """It finds them one after the other."""
     edges = {"slam": "map odom", "drive": "odom base"}[owner]
-    own = running.joins(f"/{owner}", process=process, pid=10)
+    owner_publisher = running.joins(f"/{owner}", process=process, pid=10)
     rogues = [running.joins(f"/{owner}", process="", pid=pid) for pid in (11, 12)]
-    there, anybody = [own, *rogues], [10] if process is None else []
-    send_all(running, there, edges, 2.0)
-    assert pids_of(running.found()[-1]) == [*anybody, 11, 12]
+    present, anybody = [owner_publisher, *rogues], [10] if process is None else []
+    send_all(running, present, edges, 2.0)
+    assert pids_of(running.findings()[-1]) == [*anybody, 11, 12]
     running.graph.clear()
     running.dies()
-    for publisher in there:
+    for publisher in present:
         running.graph.append(publisher)
-        send_all(running, there, edges, 1.0)
-    send_all(running, there, edges, 10.0)
-    assert running.found() == []
+        send_all(running, present, edges, 1.0)
+    send_all(running, present, edges, 10.0)
+    assert running.findings() == []
     running.leaves(rogues[0])
-    send_all(running, [own, rogues[1]], edges, 10.0)
+    send_all(running, [owner_publisher, rogues[1]], edges, 10.0)
     assert pids_of(running.only()) == [*anybody, 12]
     assert running.over() == []
 
@@ -620,7 +619,7 @@ def test_a_stranger_that_restarts_again_and_again_is_reported_rarely(
     for pid in range(100, 200):
         rogue = running.joins("/rogue", process="", pid=pid)
         running.repeat(rogue, "map odom", 5).leaves(rogue)
-    assert 3 < len(running.found()) < 10
+    assert 3 < len(running.findings()) < 10
 
 
 def test_the_name_of_an_owner_is_not_given_to_who_is_not_its_process() -> None:

@@ -6,14 +6,14 @@ from hypothesis import strategies as st
 
 from tests.support.findings import expect
 from tests.support.guard_history import History
-from tfcompose.model.messages import Clear, FindingShown, Taken
+from tfcompose.model.messages import Clear, EdgeTaken, FindingShown
 
 
-def test_a_planned_edge_that_is_published_before_the_start_is_taken_and_the_node_named(
+def test_an_edge_live_before_the_start_is_taken_and_its_node_is_named(
     history: History,
 ) -> None:
     history.repeat(history.joins("/rogue"), "map odom", 20)
-    (event,) = history.all(Taken)
+    (event,) = history.all(EdgeTaken)
     assert history.events[0] == event
     expect(history.only(), "TF807", "map → odom", "node: /rogue")
 
@@ -21,7 +21,7 @@ def test_a_planned_edge_that_is_published_before_the_start_is_taken_and_the_node
 def test_a_namesake_of_what_the_plan_starts_is_refused_before_the_start(history: History) -> None:
     history.repeat(history.joins("/slam"), "map odom", 10)
     expect(history.only(), "TF807", "map → odom", "another /slam")
-    assert "external" not in history.found()[0].help
+    assert "external" not in history.findings()[0].help
 
 
 def test_a_second_parent_before_the_start_is_taken_and_says_so(history: History) -> None:
@@ -31,7 +31,10 @@ def test_a_second_parent_before_the_start_is_taken_and_says_so(history: History)
 
 def test_an_undeclared_edge_before_the_start_keeps_nothing_from_starting(history: History) -> None:
     history.repeat(history.joins("/tracker"), "map person", 20)
-    assert (history.all(Taken), [finding.code for finding in history.found()]) == ([], ["TF803"])
+    assert (history.all(EdgeTaken), [finding.code for finding in history.findings()]) == (
+        [],
+        ["TF803"],
+    )
     assert Clear() in history.events
 
 
@@ -51,15 +54,15 @@ def test_a_publisher_that_was_there_first_and_is_discovered_late_is_taken(
     rogue.sent = 5 * hertz
     running.wait(2).repeat(rogue, "map odom", hertz, every=1 / hertz)
     assert [
-        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
-    ] == [Taken]
+        type(event) for event in running.events if isinstance(event, (FindingShown, EdgeTaken))
+    ] == [EdgeTaken]
 
 
-def test_a_latched_message_from_before_the_start_is_taken_however_late_it_comes(
+def test_a_latched_message_from_before_the_start_is_taken_however_late(
     running: History,
 ) -> None:
     running.wait(4).send(running.joins("/rogue", static=True), "base lidar", ago=10).wait(1)
-    assert len(running.all(Taken)) == 1
+    assert len(running.all(EdgeTaken)) == 1
 
 
 @pytest.mark.parametrize("hertz", [5, 10, 50, 200])
@@ -70,16 +73,16 @@ def test_a_publisher_that_began_after_the_start_is_found_within_a_second(
     rogue.sent = max(1, hertz // 5)
     running.wait(0.5).repeat(rogue, "map odom", round(0.9 * hertz), every=1 / hertz)
     assert [
-        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
+        type(event) for event in running.events if isinstance(event, (FindingShown, EdgeTaken))
     ] == [FindingShown]
 
 
-def test_a_publisher_that_began_just_before_the_start_is_found_and_not_taken_for_first(
+def test_a_publisher_from_just_before_the_start_is_found_and_not_first(
     running: History,
 ) -> None:
     running.send(running.joins("/rogue", static=True), "base lidar", ago=0.4).wait(1)
     assert [
-        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
+        type(event) for event in running.events if isinstance(event, (FindingShown, EdgeTaken))
     ] == [FindingShown]
 
 
@@ -90,7 +93,7 @@ def test_lost_messages_do_not_make_a_newcomer_one_that_was_first(running: Histor
     for _ in range(12):
         rogue.sent += 3
         running.send(rogue, "map odom").wait(0.08)
-    assert (running.all(Taken), len(running.found())) == ([], 1)
+    assert (running.all(EdgeTaken), len(running.findings())) == ([], 1)
 
 
 @settings(max_examples=100, deadline=None)
@@ -103,7 +106,7 @@ def test_lost_messages_do_not_make_a_newcomer_one_that_was_first(running: Histor
     st.floats(0, 0.2),
 )
 def test_jitter_and_a_hiccup_do_not_make_a_newcomer_one_that_was_first(
-    hertz: int, jitter: list[float], at: int, hiccup: float, unheard_s: float
+    hertz: int, jitter: list[float], hiccup_index: int, hiccup: float, unheard_s: float
 ) -> None:
     running = History().clear()
     rogue = running.joins("/rogue")
@@ -111,15 +114,15 @@ def test_jitter_and_a_hiccup_do_not_make_a_newcomer_one_that_was_first(
     rogue.sent = int(unheard_s * hertz)
     for index, part in enumerate(jitter):
         running.send(rogue, "map odom", ago=part * 0.5 / hertz).wait(
-            1 / hertz + (hiccup if index == at else 0)
+            1 / hertz + (hiccup if index == hiccup_index else 0)
         )
     running.wait(1)
-    assert running.all(Taken) == []
-    assert len(running.found()) == 1
+    assert running.all(EdgeTaken) == []
+    assert len(running.findings()) == 1
 
 
 def test_a_publisher_is_not_taken_for_first_long_after_the_start(running: History) -> None:
     running.wait(20).send(running.joins("/rogue", static=True), "base lidar", ago=60).wait(1)
     assert [
-        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
+        type(event) for event in running.events if isinstance(event, (FindingShown, EdgeTaken))
     ] == [FindingShown]

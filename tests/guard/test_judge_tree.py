@@ -9,12 +9,12 @@ from tests.support.findings import expect, words_of
 from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
 from tfcompose.guard.judge import Judge
 from tfcompose.guard.ledger import MOST_UNDECLARED, MOST_VERDICT_EDGES
-from tfcompose.model.messages import FindingShown, Taken
+from tfcompose.model.messages import EdgeTaken, FindingShown
 from tfcompose.model.plan import EdgePattern, GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import Publisher
 
 
-def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_other() -> None:
+def test_the_owner_may_hang_a_switched_edge_only_on_its_declared_parents() -> None:
     history = History(edges=(*EDGES, TOOL)).clear()
     changer = history.joins("/changer")
     for parent in ("arm", "rack_1", "rack_2", "arm"):
@@ -24,7 +24,7 @@ def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_oth
     expect(history.only(), "TF802", "changer (/changer)", "table → tool", "arm → tool")
 
 
-def test_another_node_may_not_publish_a_switched_edge_on_any_of_its_parents() -> None:
+def test_another_node_may_publish_a_switched_edge_on_none_of_its_parents() -> None:
     history = History(edges=(*EDGES, TOOL)).clear()
     history.repeat(history.joins("/changer"), "arm tool", 5)
     history.repeat(history.joins("/rogue"), "rack_1 tool", 10)
@@ -35,7 +35,7 @@ def test_another_node_may_not_publish_a_switched_edge_on_any_of_its_parents() ->
     "policy",
     [GuardPolicy(), GuardPolicy(allow=(EdgePattern("*", "*"),)), GuardPolicy("watch", "ignore")],
 )
-def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop_is_named(
+def test_an_edge_that_closes_a_loop_is_always_an_error_and_names_the_loop(
     policy: GuardPolicy,
 ) -> None:
     running = History(policy).clear()
@@ -46,22 +46,20 @@ def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop
     assert running.only().severity == "error"
 
 
-def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(
+def test_a_loop_through_several_strangers_is_found_at_its_last_edge(
     running: History,
 ) -> None:
-    first, other = running.joins("/one"), running.joins("/other")
+    first, second = running.joins("/one"), running.joins("/other")
     for _ in range(5):
-        running.send(first, "base cup").send(other, "cup map").wait(0.1)
-    loop = next(finding.message for finding in running.found() if finding.code == "TF820")
+        running.send(first, "base cup").send(second, "cup map").wait(0.1)
+    loop = next(finding.message for finding in running.findings() if finding.code == "TF820")
     assert loop.endswith("cup → map from /other")
     assert "the frames map → odom → base → cup → map" in next(
         reports for reports in running.reports() if "TF820" in reports
     )
 
 
-def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_are_allowed() -> (
-    None
-):
+def test_a_loop_of_allowed_foreign_frames_is_not_reported() -> None:
     running = History(
         GuardPolicy(allow=(EdgePattern("cup", "saucer"), EdgePattern("saucer", "cup")))
     ).clear()
@@ -83,7 +81,7 @@ def test_a_stranger_that_sends_for_long_closes_a_loop_all_the_same(running: Hist
     assert "TF820" in [reports[:5] for reports in running.reports()]
 
 
-def test_a_loop_is_reported_to_be_over_and_to_have_been_there_before_the_start(
+def test_the_end_of_a_loop_and_a_loop_before_the_start_are_reported(
     running: History,
 ) -> None:
     rogue = running.joins("/rogue")
@@ -93,7 +91,7 @@ def test_a_loop_is_reported_to_be_over_and_to_have_been_there_before_the_start(
     early = History()
     early.repeat(early.joins("/rogue"), "base map", 20)
     assert early.all(FindingShown) == []
-    assert isinstance(early.events[0], Taken)
+    assert isinstance(early.events[0], EdgeTaken)
     expect(early.only(), "TF807", "base → map", "/rogue", "map → odom → base → map")
 
 
@@ -102,8 +100,8 @@ def test_two_nodes_that_publish_one_allowed_frame_are_named(running: History) ->
     a, b = running.joins("/a"), running.joins("/b")
     for _ in range(10):
         running.send(a, "map person_1").send(b, "odom person_1").wait(0.1)
-    assert len(running.found()) in {1, 2}
-    for finding in running.found():
+    assert len(running.findings()) in {1, 2}
+    for finding in running.findings():
         expect(finding, "TF822", "person_1", "/a", "/b")
 
 
@@ -160,8 +158,8 @@ def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> Non
     running.repeat(running.joins("/slam", process="slam"), "odom base", 3)
     running.repeat(running.joins("/rogue", process=""), "base lidar", 3)
     running.repeat(running.joins("/drive", process=""), "base camera", 3)
-    found = [event for event in running.events if isinstance(event, FindingShown)]
-    assert [(event.found.code, event.process) for event in found] == [
+    events = [event for event in running.events if isinstance(event, FindingShown)]
+    assert [(event.found.code, event.process) for event in events] == [
         ("TF801", "slam"),
         ("TF801", ""),
         ("TF801", ""),
@@ -174,8 +172,8 @@ def test_a_guard_that_goes_on_knows_the_processes_that_another_plan_adds() -> No
     plan = running.judge.plan
     running.judge.follow(replace(plan, processes=(*plan.processes, mapper)))
     running.repeat(running.joins("/mapper", process="mapper"), "odom base", 3)
-    found = [event for event in running.events if isinstance(event, FindingShown)]
-    assert [(event.found.code, event.process) for event in found] == [("TF801", "mapper")]
+    events = [event for event in running.events if isinstance(event, FindingShown)]
+    assert [(event.found.code, event.process) for event in events] == [("TF801", "mapper")]
 
 
 @pytest.mark.parametrize(
@@ -185,7 +183,7 @@ def test_a_guard_that_goes_on_knows_the_processes_that_another_plan_adds() -> No
         ("map base", "let /mapper"),
     ],
 )
-def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_out(
+def test_an_own_program_is_advised_to_omit_the_edge_and_not_to_end(
     edges: str, advice: str
 ) -> None:
     slam = next(process for process in PROCESSES if process.name == "slam")
@@ -196,9 +194,9 @@ def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_ou
         )
     ).clear()
     history.repeat(history.joins("/mapper"), edges, 5).repeat(history.joins("/rogue"), edges, 5)
-    own, stranger = history.found()
-    expect(own, own.code, advice)
-    expect(stranger, own.code, "stop /rogue")
+    own_finding, stranger = history.findings()
+    expect(own_finding, own_finding.code, advice)
+    expect(stranger, own_finding.code, "stop /rogue")
 
 
 # Floods: what nobody declared is judged up to a bound, what is declared always.
@@ -208,7 +206,7 @@ def flood_of(count: int, begin: int = 0) -> str:
     return ", ".join(f"f{number} f{number + 1}" for number in range(begin, begin + count))
 
 
-def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_judged() -> None:
+def test_an_undeclared_flood_is_reported_once_and_declared_edges_judged() -> None:
     running = History(GuardPolicy(mode="strict")).clear()
     rogue, slam = running.joins("/rogue"), running.joins("/slam")
     running.check().send(rogue, flood_of(3000)).wait(0.2)
@@ -217,11 +215,11 @@ def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_jud
     running.send(slam, "map odom")
     assert running.admitted is None
     running.wait(1)
-    codes = [finding.code for finding in running.found()]
+    codes = [finding.code for finding in running.findings()]
     assert codes.count("TF853") == 1
     assert "TF801" in codes, "the declared edge in the flood"
     expect(
-        next(finding for finding in running.found() if finding.code == "TF853"),
+        next(finding for finding in running.findings() if finding.code == "TF853"),
         "TF853",
         "/rogue",
         "3,000 frames",
@@ -244,7 +242,7 @@ def test_a_flood_is_reported_with_how_much_and_how_often() -> None:
         running.judge.report_flood(rogue.gid, 10_000, running.now)
         running.wait(0.05)
     expect(
-        next(finding for finding in running.found() if finding.code == "TF853"),
+        next(finding for finding in running.findings() if finding.code == "TF853"),
         "TF853",
         "/rogue",
         "10,000 frames",
@@ -260,13 +258,17 @@ def test_others_are_judged_during_a_flood_and_what_is_allowed_passes() -> None:
     assert running.admitted == frozenset({("map", "person_7")})
     running.send(tracker, "map person_1").send(tracker, "map person_2, map cup").wait(1)
     assert running.admitted == frozenset({("map", "person_2")})
-    found = [
+    reported = [
         (finding.code, word)
-        for finding in running.found()
+        for finding in running.findings()
         for word in ("/rogue", "/tracker")
         if word in finding.message
     ]
-    assert sorted(set(found)) == [("TF803", "/rogue"), ("TF803", "/tracker"), ("TF853", "/rogue")]
+    assert sorted(set(reported)) == [
+        ("TF803", "/rogue"),
+        ("TF803", "/tracker"),
+        ("TF853", "/rogue"),
+    ]
 
 
 def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:
@@ -278,7 +280,7 @@ def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:
     assert len(running.judge.ledger.entries) <= MOST_UNDECLARED + len(EDGES) + 500
     judged = running.judge.ledger._judged
     assert sum(len(edges) for _, _, edges in judged) <= MOST_VERDICT_EDGES
-    assert [finding.code for finding in running.found()].count("TF853") == 1
+    assert [finding.code for finding in running.findings()].count("TF853") == 1
 
 
 def test_the_cost_of_a_chain_grows_with_its_edges_and_not_faster() -> None:

@@ -58,8 +58,8 @@ class History:
         """Let time pass with these arrivals, at seconds from now."""
         begun = self.now
         ticks = [(TICK_S * n, "") for n in range(1, round(seconds / TICK_S) + 1)]
-        for at, child in sorted([*arrivals, *ticks]):
-            self.now = begun + at
+        for offset_s, child in sorted([*arrivals, *ticks]):
+            self.now = begun + offset_s
             self.events += (
                 self.live.note_arrivals((child,), self.now) if child else self.live.judge(self.now)
             )
@@ -72,11 +72,11 @@ class History:
             [(n / hertz, child) for n in range(round(seconds * hertz)) for child in children],
         )
 
-    def found(self) -> list[Finding]:
+    def findings(self) -> list[Finding]:
         return [event.found for event in self.events if isinstance(event, FindingShown)]
 
     def only(self) -> Finding:
-        (finding,) = self.found()
+        (finding,) = self.findings()
         return finding
 
     def over(self) -> list[str]:
@@ -133,10 +133,10 @@ def test_an_owner_that_falls_silent_is_named_within_a_second_and_once(
 ) -> None:
     history = watch(edge("map odom", "slam", hertz)).steadily(3, hertz, "odom").run(1 - 1 / hertz)
     expect(history.only(), "TF804", "slam (/slam)", "map → odom", " ms")
-    assert len(history.run(60).found()) == 1
+    assert len(history.run(60).findings()) == 1
 
 
-def test_what_an_owner_that_was_stopped_on_purpose_still_sends_does_not_count(
+def test_messages_of_a_deliberately_stopped_owner_do_not_count(
     watch: Callable[..., History],
 ) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(2, 10, "odom")
@@ -153,13 +153,13 @@ def test_edges_without_a_rate_and_static_ones_are_never_silent(
     watch: Callable[..., History],
 ) -> None:
     history = watch(edge("base left", "joints"), edge("base lidar", "lidar", 10, "static"))
-    assert history.steadily(0.1, 10, "left", "lidar").run(60).found() == []
+    assert history.steadily(0.1, 10, "left", "lidar").run(60).findings() == []
 
 
 def test_a_slow_rate_may_be_silent_for_four_periods(watch: Callable[..., History]) -> None:
     history = watch(edge("map odom", "slam", 0.5)).steadily(20, 0.5, "odom").run(5)
-    assert history.found() == []
-    assert len(history.run(2).found()) == 1
+    assert history.findings() == []
+    assert len(history.run(2).findings()) == 1
 
 
 def test_silent_edges_of_one_owner_are_one_finding_and_one_recovery(
@@ -185,7 +185,7 @@ def test_an_owner_that_is_back_and_falls_silent_again_is_named_again(
     )
     (over,) = history.over()
     assert (over.startswith("map → odom "), over.endswith(" 2.3 s")) == (True, True)
-    assert len(history.run(2).found()) == 2
+    assert len(history.run(2).findings()) == 2
 
 
 @pytest.mark.parametrize(
@@ -205,23 +205,23 @@ def test_an_owner_that_is_too_slow_is_named_once_with_its_rate(
 def test_an_owner_that_is_nearly_as_fast_as_declared_or_faster_is_right(
     watch: Callable[..., History], hertz: float
 ) -> None:
-    assert watch(edge("map odom", "slam", 10)).steadily(20, hertz, "odom").found() == []
+    assert watch(edge("map odom", "slam", 10)).steadily(20, hertz, "odom").findings() == []
 
 
 def test_an_owner_that_is_fast_enough_again_is_reported_to_be(
     watch: Callable[..., History],
 ) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(6, 5, "odom").steadily(6, 10, "odom")
-    assert len(history.found()) == 1
+    assert len(history.findings()) == 1
     (over,) = history.over()
     assert over.startswith("map → odom ")
 
 
-def test_an_owner_a_little_below_what_it_declares_is_neither_slow_anew_nor_fast_enough_again(
+def test_a_rate_just_below_the_declared_one_gives_no_new_report(
     watch: Callable[..., History],
 ) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(6, 5, "odom").steadily(12, 8.5, "odom")
-    assert (len(history.found()), history.over()) == (1, [])
+    assert (len(history.findings()), history.over()) == (1, [])
 
 
 def test_several_slow_edges_of_one_owner_are_one_finding(watch: Callable[..., History]) -> None:
@@ -231,11 +231,11 @@ def test_several_slow_edges_of_one_owner_are_one_finding(watch: Callable[..., Hi
     expect(history.only(), "TF805", "odom → a, odom → b", " 5 Hz", "drive (/drive)", " 10 Hz")
 
 
-def test_an_owner_that_sends_a_tenth_of_what_is_declared_is_silent_then_slow_and_nothing_else(
+def test_an_owner_at_a_tenth_of_its_rate_is_silent_then_slow_only(
     watch: Callable[..., History],
 ) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(3, 10, "odom").steadily(60, 1, "odom")
-    assert [finding.code for finding in history.found()] == ["TF804", "TF805"]
+    assert [finding.code for finding in history.findings()] == ["TF804", "TF805"]
     assert history.over() == []
     assert len(history.steadily(5, 10, "odom").over()) == 1
 
@@ -249,7 +249,7 @@ def test_a_hiccup_of_half_a_second_is_neither_silence_nor_slowness(
         .run(0.5)
         .steadily(5, 50, "base")
     )
-    assert history.found() == []
+    assert history.findings() == []
 
 
 @pytest.mark.parametrize(("stall_s", "late_s"), [(0.5, 0.2), (2, 3), (30, 3)])
@@ -266,8 +266,8 @@ def test_a_guard_that_was_kept_from_running_reports_nothing_false(
     for child in ["odom"] * 20 + ["base"] * 100:
         history.live.note_arrivals((child,), history.now)
     history.steadily(6, 10, "odom", "base", "base", "base", "base", "base")
-    assert history.found() == []
-    assert len(history.run(2).found()) == 2
+    assert history.findings() == []
+    assert len(history.run(2).findings()) == 2
 
 
 @settings(max_examples=80, deadline=None)
@@ -280,13 +280,13 @@ def test_jitter_and_checks_at_uneven_times_find_nothing(
     hertz: float, jitter: list[float], ticks: list[float]
 ) -> None:
     plan = Plan("rover", "0", None, RosSettings(), (edge("map odom", "slam", hertz),), ())
-    live, at, now, sent = Liveness(plan), 500.0, 500.0, 0
+    live, arrival_s, now, sent = Liveness(plan), 500.0, 500.0, 0
     times = [500.0 + (n + part) / hertz for n, part in enumerate(jitter)]
     for pause in [*ticks, *[TICK_S] * 20]:
         now += pause
         while sent < len(times) and times[sent] <= now:
-            at = max(at, times[sent])
-            live.note_arrivals(("odom",), now if pause > TICK_S else at)
+            arrival_s = max(arrival_s, times[sent])
+            live.note_arrivals(("odom",), now if pause > TICK_S else arrival_s)
             sent += 1
         if sent < len(times):
             assert [event for event in live.judge(now) if isinstance(event, FindingShown)] == []
@@ -302,9 +302,9 @@ def test_a_latching_owner_that_leaves_is_reported_once_and_when_it_is_back(
     live.note_arrivals(("lidar",), 1)
     live.note_arrivals(("imu",), 1)
     assert live.static_writers(["/static", "/other"]) == []
-    (found,) = live.static_writers(["/other"])
-    assert isinstance(found, FindingShown)
-    expect(found.found, "TF804", "static (/static)", "base → lidar, base → imu")
+    (event,) = live.static_writers(["/other"])
+    assert isinstance(event, FindingShown)
+    expect(event.found, "TF804", "static (/static)", "base → lidar, base → imu")
     assert live.static_writers([]) == []
     (back,) = live.static_writers(["/static"])
     assert isinstance(back, RecoveredShown)
@@ -317,7 +317,7 @@ def test_edges_may_come_together_apart_and_in_other_company(watch: Callable[...,
         for children in (("a", "b", "c"), ("a", "b"), ("b", "c"), ("c",), ("a", "c")):
             history.live.note_arrivals(children, history.now)
             history.run(0.1)
-    assert history.found() == []
+    assert history.findings() == []
     for _ in range(20):
         history.live.note_arrivals(("a", "b"), history.now)
         history.run(0.1)

@@ -61,7 +61,7 @@ def test_nobody_is_silent_or_slow_while_the_guard_loses_messages(watch: Watch) -
     assert rates == [pytest.approx(HERTZ, rel=0.1)] * 2
 
 
-def test_an_owner_that_is_silent_after_that_is_named_within_2_s_of_the_resending(
+def test_an_owner_still_silent_is_named_within_2_s_of_the_resending(
     watch: Watch,
 ) -> None:
     watch.run(0.1, "base", lost=2).run(3.5 + 2, "base")

@@ -135,13 +135,13 @@ def is_green(view: Started, monitor: Started) -> bool:
 
 def wrong(computers: Computers) -> dict[str, Any]:
     """Return what a computer's ``ps`` says is wrong, by its name."""
-    found = {}
+    status_by_name = {}
     for name in computers.computers:
         robots = json.loads(tfcompose(computers, name, "ps", "--format", "json").stdout or "[]")
         keys = ("missing", "silent", "findings")
         if not robots or not robots[0]["complete"] or any(robots[0][key] for key in keys):
-            found[name] = robots and [robots[0][key] for key in keys]
-    return found
+            status_by_name[name] = robots and [robots[0][key] for key in keys]
+    return status_by_name
 
 
 #: A minute each: who starts without a carrier joins ROS anew, and names outlive the lease.
@@ -167,8 +167,8 @@ def test_after_a_gap_each_computer_sees_all_edges_of_the_other_one_again(
         deadline = time.monotonic() + GREEN_WITHIN_S
         assert until(lambda: not wrong(computers), GREEN_WITHIN_S), wrong(computers)
         left_s = max(0.0, deadline - time.monotonic())
-        shown = [(view.lines[-1:], monitor.lines[-1:]) for view, monitor in watches]
-        assert until(lambda: are_green(watches), left_s), shown
+        last_lines = [(view.lines[-1:], monitor.lines[-1:]) for view, monitor in watches]
+        assert until(lambda: are_green(watches), left_s), last_lines
     for name in computers.computers:
         doctor = tfcompose(computers, name, "doctor", "--for", "2")
         assert doctor.returncode == 0, doctor

@@ -39,8 +39,10 @@ PLAN = Plan(
     (PlanProcess("guard", "guard"),),
     file="rover.yaml",
     profiles=("demo", "night"),
+    overlays=("overlays/ant.yaml",),
 )
-NAMES = ["file", "profiles", "robot", "spec_digest"]
+NAMES = ["file", "overlays", "profiles", "robot", "spec_digest"]
+VALUES = ["rover.yaml", ["overlays/ant.yaml"], ["demo", "night"], "rover", "sha256:1"]
 
 
 class Client:
@@ -95,7 +97,7 @@ def client(node: Any, served: PlanParameters) -> Iterator[Client]:
 def test_they_are_the_origin_of_the_plan_each_with_a_description(client: Client) -> None:
     listed = client.result(client.parameters.list_parameters()).result.names
     assert set(NAMES) < set(listed)
-    assert client.values(*NAMES) == ["rover.yaml", ["demo", "night"], "rover", "sha256:1"]
+    assert client.values(*NAMES) == VALUES
     described = client.result(client.parameters.describe_parameters([*NAMES, "use_sim_time"]))
     assert all(descriptor.read_only for descriptor in described.descriptors)
     assert all(descriptor.description for descriptor in described.descriptors[:-1])
@@ -174,6 +176,7 @@ def test_ros2_param_reads_them(domain: Domain, tmp_path: Path) -> None:
     dumped = safe_load(param("dump"))[name]["ros__parameters"]
     assert {key: dumped[key] for key in NAMES} == {
         "file": "robot.yaml",
+        "overlays": [],
         "profiles": ["demo"],
         "robot": "rover",
         "spec_digest": digest,

@@ -43,7 +43,7 @@ class Bus:
     """The node and the graph of a relay: who sends, and how many listen on each topic."""
 
     topics: tuple[str, str] = TOPICS
-    says_who: bool = True
+    gid_identifies_node: bool = True
     fenced: dict[bytes, bool | None] = field(default_factory=dict)
     senders: list[Sender] = field(default_factory=list)
     listeners: dict[str, int] = field(default_factory=dict)
@@ -114,14 +114,14 @@ class Passing:
 
     remapped: dict[str, tuple[str, str]] | None = None
     bus: Bus = field(default_factory=Bus)
-    own: set[bytes | None] = field(default_factory=set)
+    own_gids: set[bytes | None] = field(default_factory=set)
     here: list[Publisher] = field(default_factory=list)
     now: float = 100.0
 
     def __post_init__(self) -> None:
         node, graph = cast("Node", self.bus), cast("TFGraph", self.bus)
-        feedback = None if self.remapped is None else Feedback(node, self.remapped, self.own)
-        self.relay = Relay(node, graph, self.own, feedback)
+        feedback = None if self.remapped is None else Feedback(node, self.remapped, self.own_gids)
+        self.relay = Relay(node, graph, self.own_gids, feedback)
 
     def send(
         self, gid: bytes, edges: str, admitted: str | None = None, *, who: str = "/x", **more: Any
@@ -194,7 +194,7 @@ def test_moving_edges_pass_byte_for_byte_or_without_what_is_not_admitted() -> No
     assert running.bus.moving() == [{("odom", "base"), ("base", "arm")}, {("odom", "base")}]
 
 
-def test_names_that_were_not_all_that_was_sent_are_sent_as_they_were_judged() -> None:
+def test_incomplete_frame_names_are_sent_as_judged() -> None:
     running = Passing()
     message = replace(message_of(DRIVE, "odom base", static=False), exact=False)
     sent = data_of(DRIVE, "odom base_more", static=False)
@@ -209,7 +209,7 @@ def test_names_that_were_not_all_that_was_sent_are_sent_as_they_were_judged() ->
     assert running.bus.senders[0].sent != [sent.received.data]
 
 
-def test_what_comes_past_the_fence_or_from_nobody_that_is_known_is_not_passed_on() -> None:
+def test_edges_past_the_fence_or_from_unknown_senders_are_not_passed_on() -> None:
     running = Passing()
     running.send(DRIVE, "odom base", fenced=False, static=False)
     running.bus.fenced[SLAM] = False
@@ -240,7 +240,7 @@ def test_a_refused_publisher_is_named_once_by_its_process(
     assert "/slam" not in log
 
 
-def test_a_remapped_process_receives_the_rest_of_the_tree_and_nothing_of_its_own() -> None:
+def test_a_remapped_process_receives_the_tree_without_its_own_edges() -> None:
     private = {"slam": ("/slam/tf", "/slam/tf_static"), "drive": ("/drive/tf", "/drive/tf_static")}
     running = Passing(private)
     running.bus.listeners |= dict.fromkeys((*private["slam"], *private["drive"]), 2)
@@ -259,7 +259,7 @@ def test_a_remapped_process_receives_the_rest_of_the_tree_and_nothing_of_its_own
     assert running.bus.latched("/drive/tf_static") == [set()]
 
 
-def test_a_burst_of_more_publishers_than_tf2_keeps_messages_is_kept_for_slow_listeners() -> None:
+def test_a_burst_beyond_tf2s_queue_is_kept_for_slow_listeners() -> None:
     passing = Passing({"slam": ("/slam/tf", "/slam/tf_static")})
     passing.bus.listeners = {"/slam/tf": 2, "/slam/tf_static": 2}
     passing.observe()

@@ -168,7 +168,7 @@ def reported(robot: Fenced) -> list[str]:
     return [line for line in robot.lines(" published by /rogue") if "note" not in line]
 
 
-def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_back_is_named(
+def test_only_owned_edges_pass_unchanged_and_the_rest_is_named(
     robot: Fenced,
 ) -> None:
     robot.says("error[TF801]", "/rogue;")
@@ -226,10 +226,10 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
 
 
 @pytest.mark.parametrize("robot", FENCES[:1], indirect=True, scope="module")
-def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_again(
+def test_a_dead_guard_passes_nothing_and_its_successor_passes_all(
     robot: Fenced,
 ) -> None:
-    with open_node("early", "/test") as node, open_node("meanwhile", "/test") as other:
+    with open_node("early", "/test") as node, open_node("meanwhile", "/test") as second_node:
         listener = Listener(node)
         assert children(listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
         more = re.compile(r"(?: and (\d+) more edge)? (?:is|are) published by /rogue")
@@ -252,7 +252,7 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
         assert [
             received for received in meanwhile if died_ns < received.source_ns < began_ns
         ] == []
-        joined = Listener(other)
+        joined = Listener(second_node)
         robot.says("warning[TF808]", "guard", "SIGKILL", "/tf")
         robot.says("over", "guard")
         assert (
@@ -310,8 +310,8 @@ def heard_by(up: Started) -> dict[str, int]:
     """Return what the listener has heard since it was started last."""
     since = up.output.rpartition("started ear__")[2]
     lines = [line.partition("heard ")[2] for line in since.splitlines() if "| heard " in line]
-    found: dict[str, int] = json.loads(lines[-1]) if lines else {}
-    return found
+    counts: dict[str, int] = json.loads(lines[-1]) if lines else {}
+    return counts
 
 
 def encoded(parent: str, child: str) -> bytes:
@@ -320,7 +320,7 @@ def encoded(parent: str, child: str) -> bytes:
     )
 
 
-def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_late(
+def test_a_late_remapped_listener_hears_the_complete_tree_once(
     start: Callable[..., Started], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -349,5 +349,5 @@ def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_la
         start("restart", "ear__").process.wait(60)
         assert until(lambda: heard_by(up).keys() >= full), up.output
         assert heard_by(up)["ear"] == 1
-        known = {"/tfcompose_guard", "/test/outside"}
-        assert until(lambda: {writer.node for writer in writers(node, "/tf_static")} == known)
+        expected = {"/tfcompose_guard", "/test/outside"}
+        assert until(lambda: {writer.node for writer in writers(node, "/tf_static")} == expected)

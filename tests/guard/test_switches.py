@@ -28,7 +28,7 @@ DRIVEN = (Driven("front", "realsense/d455", publishes=False, switch={"publish_tf
 
 
 @pytest.mark.parametrize(
-    ("wanted", "found", "reported"),
+    ("expected", "actual", "reported"),
     [
         (False, False, False),
         (False, True, True),
@@ -44,9 +44,9 @@ DRIVEN = (Driven("front", "realsense/d455", publishes=False, switch={"publish_tf
     ],
 )
 def test_a_parameter_is_reported_exactly_where_it_is_another_value(
-    wanted: Value, found: Value | None, *, reported: bool
+    expected: Value, actual: Value | None, *, reported: bool
 ) -> None:
-    wrong = not_taken("/front/front", {"switch": wanted}, {"switch": found}, DRIVEN)
+    wrong = not_taken("/front/front", {"switch": expected}, {"switch": actual}, DRIVEN)
     assert [finding.code for finding in wrong] == ["TF829"] * reported
 
 
@@ -126,10 +126,10 @@ def left(watch: Watch, tmp_path: Path) -> Callable[[], dict[str, Any]]:
     """Return what the guard that died has left, as the next one reads it."""
 
     def read() -> dict[str, Any]:
-        known: dict[str, Any] = {}
+        memory: dict[str, Any] = {}
         for event in watch.all(Remember):
-            known |= event.changed
-        (tmp_path / "memory").write_text(json.dumps(known))
+            memory |= event.changed
+        (tmp_path / "memory").write_text(json.dumps(memory))
         return recall_memory({MEMORY_FD: str(os.open(tmp_path / "memory", os.O_RDONLY))})
 
     return read
@@ -165,7 +165,7 @@ def test_the_switches_of_another_plan_are_read_and_the_same_ones_not_again(watch
     watch.run_for(10)
     front = PlanProcess("front", "external", switches={"/front": {"publish_tf": False}})
     rear = PlanProcess("rear", "external", switches={"/rear": {"publish_tf": False}})
-    for processes, found in (((front, rear), 2), ((front,), 2), ((rear,), 3)):
+    for processes, count in (((front, rear), 2), ((front,), 2), ((rear,), 3)):
         watch.switches.follow(Plan("rover", "", None, RosSettings(), (), processes))
         watch.run_for(10)
-        assert len(watch.all(FindingShown)) == found
+        assert len(watch.all(FindingShown)) == count

@@ -50,7 +50,7 @@ def test_each_judge_gets_the_edges_of_the_owners_on_its_topics(
     }
 
 
-def test_the_guards_own_topics_are_watched_where_nothing_is_planned_on_them(
+def test_the_guard_watches_its_own_topics_where_nothing_is_planned(
     edge: Callable[..., PlanEdge],
 ) -> None:
     full = plan(edge("map one/base", "one/static"))

@@ -33,7 +33,7 @@ def test_lines_are_the_same_however_the_bytes_arrive(text: str, size: int) -> No
 
 
 @given(st.lists(st.binary(max_size=40), max_size=20))
-def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(
+def test_lines_stay_within_the_limit_without_loss_or_much_memory(
     chunks: list[bytes],
 ) -> None:
     lines = Lines(8)
@@ -108,11 +108,11 @@ def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("seconds", [0.0, 0.03, 0.06, 0.1])
-def test_an_own_process_that_is_ordered_to_end_while_it_starts_ends_by_its_own_rules(
+def test_an_own_process_ordered_to_end_during_its_start_ends_by_its_rules(
     number: int, seconds: float, tmp_path: Path
 ) -> None:
     argv = (*HERE, "static", str(tmp_path / "plan.json"), "static")
-    popen = spawn(ChildCommand(argv, dict(os.environ), tmp_path, own=True), ())
+    popen = spawn(ChildCommand(argv, dict(os.environ), tmp_path, is_built_in=True), ())
     time.sleep(seconds)
     popen.send_signal(number)
     _, errors = popen.communicate(timeout=60)
@@ -141,7 +141,7 @@ def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_pat
     popen.communicate()
 
 
-def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last_words_are_read(
+def test_a_process_writes_lines_to_a_pseudo_terminal_and_none_is_lost(
     tmp_path: Path,
 ) -> None:
     code = (

@@ -42,7 +42,7 @@ def test_pipes_of_a_guard_that_cannot_all_be_opened_are_closed(
 
 
 def test_a_process_that_cannot_be_prepared_leaves_the_reason_to_its_start(tmp_path: Path) -> None:
-    command = ChildCommand(("true",), dict(os.environ), tmp_path, own=True)
+    command = ChildCommand(("true",), dict(os.environ), tmp_path, is_built_in=True)
     with DefaultSelector() as selector, ExitStack() as ending:
         children = Children(selector, "", lambda _: None, lambda _: None, lambda name, _: name)
         ending.callback(children.close)

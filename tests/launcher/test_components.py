@@ -57,7 +57,7 @@ def loaded(*components: PlanProcess, box: PlanProcess = BOX) -> History:
     return history.answer(*(process.name for process in components))
 
 
-def test_components_are_loaded_in_the_plans_order_once_their_container_is_ready() -> None:
+def test_components_load_in_plan_order_once_their_container_is_ready() -> None:
     history = begin(GUARD, component("b"), component("a"), BOX).feed(Clear())
     assert history.started == ["guard", "box"]
     assert history.loads() == []
@@ -79,7 +79,7 @@ def test_what_waits_for_a_component_follows_it_and_its_edges_make_it_ready() -> 
     assert history.started == ["guard", "box", "nav"]
 
 
-def test_a_component_that_fails_to_load_ends_everything_with_the_containers_words() -> None:
+def test_a_failed_component_ends_everything_with_the_containers_text() -> None:
     history = begin(GUARD, BOX, component("a")).feed(
         Clear(), GateState("box", "there", is_open=True)
     )
@@ -125,10 +125,10 @@ def test_a_container_that_dies_comes_back_with_its_components_in_order() -> None
     assert history.orders.count(Present("b")) == 1
     history.answer("b", "a")
     assert [history.state.tracked[name].restarts for name in ("box", "a", "b")] == [1, 1, 1]
-    assert history.found() == []
+    assert history.findings() == []
 
 
-def test_an_answer_of_the_container_before_says_nothing_about_the_one_after() -> None:
+def test_an_answer_of_the_old_container_does_not_count_for_the_new_one() -> None:
     box = replace(BOX, restart="on-failure")
     history = begin(GUARD, box, component("a")).feed(
         Clear(), GateState("box", "there", is_open=True)
@@ -146,9 +146,9 @@ def test_an_answer_of_the_container_before_says_nothing_about_the_one_after() ->
 def test_a_container_that_ends_for_good_takes_its_components_with_it() -> None:
     history = loaded(component("a", required=False), box=replace(BOX, required=False))
     history.feed(Exited("box", 3))
-    codes = [(finding.code, finding.severity) for finding in history.found()]
+    codes = [(finding.code, finding.severity) for finding in history.findings()]
     assert codes == [("TF808", "warning"), ("TF808", "warning")]
-    expect(history.found()[1], "TF808", "a", "box")
+    expect(history.findings()[1], "TF808", "a", "box")
 
 
 def test_a_component_is_stopped_started_and_restarted_alone() -> None:
@@ -173,7 +173,7 @@ def test_a_component_that_is_stopped_while_it_is_loaded_is_unloaded() -> None:
     assert history.answer("a").state.tracked["a"].state == "stopped"
 
 
-def test_a_container_is_restarted_with_its_components_but_not_with_one_that_was_stopped() -> None:
+def test_a_restarted_container_reloads_all_but_stopped_components() -> None:
     history = loaded(component("a"), component("b")).feed(ProcessRequest("stop", "b")).answer("b")
     history.feed(ProcessRequest("restart", "box"))
     assert history.killed == [("box", SIGINT)]
@@ -183,7 +183,7 @@ def test_a_container_is_restarted_with_its_components_but_not_with_one_that_was_
     assert history.state.tracked["b"].state == "stopped"
 
 
-def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() -> None:
+def test_a_full_stop_unloads_no_component_and_ends_in_order() -> None:
     history = loaded(component("a"), component("b", after={"a": "ready"})).feed(
         GateState("box", "there", is_open=True)
     )
@@ -205,7 +205,7 @@ def test_a_stop_of_everything_waits_for_no_answer_of_a_container() -> None:
     assert history.feed(Exited("box", 0), Exited("guard", 0)).exit_code == 0
 
 
-def test_components_of_a_container_that_is_external_are_unloaded_at_the_end() -> None:
+def test_components_of_an_external_container_are_unloaded_at_the_end() -> None:
     box = replace(BOX, kind="external", argv=())
     history = loaded(component("a"), box=box).feed(DownRequest())
     assert history.requested[-1] == ComponentOrder("a", history.requested[0].number, "unload")
@@ -231,7 +231,7 @@ def test_a_guard_that_follows_another_is_given_what_is_not_answered_yet() -> Non
     assert history.states("b") == ["starting", "running"], "it runs already"
 
 
-def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -> None:
+def test_a_component_without_its_containers_answer_is_reported_once() -> None:
     history = begin(GUARD, BOX, component("a")).feed(
         Clear(), GateState("box", "there", is_open=True)
     )
@@ -241,7 +241,7 @@ def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -
     assert waits_for(history.state, history.state.tracked["a"]).startswith("box")
 
 
-def test_a_changed_component_is_unloaded_and_loaded_and_one_that_vanished_is_unloaded() -> None:
+def test_a_changed_component_is_reloaded_and_a_removed_one_is_unloaded() -> None:
     history = loaded(component("a"), component("b"))
     plan = replace(
         history.plan,
@@ -260,7 +260,7 @@ def test_a_changed_component_is_unloaded_and_loaded_and_one_that_vanished_is_unl
     assert history.loads() == ["a", "b", "a"]
 
 
-def test_a_container_of_another_plan_that_is_gone_takes_its_components_along() -> None:
+def test_a_container_removed_by_another_plan_takes_its_components_along() -> None:
     history = loaded(component("a"))
     history.feed(NewPlan(replace(history.plan, processes=(GUARD,)), frozenset()))
     history.feed(Exited("box", 0))
@@ -286,14 +286,12 @@ def gone(history: History, name: str) -> History:
     return history.feed(ComponentState(name, number, "unloaded", f"/box has no /{name} any more"))
 
 
-def test_a_component_that_somebody_unloads_has_ended_and_is_loaded_again_as_its_policy_says() -> (
-    None
-):
+def test_a_component_unloaded_by_others_reloads_as_its_policy_says() -> None:
     history = gone(loaded(component("a")), "a")
     expect(history.only(), "TF808", "a", "/box")
     assert [name for name, _ in history.killed] == ["box"]
     history = gone(loaded(component("a", restart="on-failure", owns=(("odom", "base"),))), "a")
-    assert history.found() == []
+    assert history.findings() == []
     assert history.orders[-1] == Absent("a")
     history.wait(1.0).answer("a")
     assert history.states("a")[-3:] == ["backoff", "starting", "running"]
@@ -307,7 +305,7 @@ def test_a_load_that_fails_slowly_is_given_up_as_one_that_fails_at_once() -> Non
     assert history.state.tracked["a"].state == "fatal"
 
 
-def test_a_guard_that_follows_another_hears_of_an_owner_before_it_is_to_load_it() -> None:
+def test_a_successor_guard_hears_of_an_owner_before_it_loads_it() -> None:
     history = begin(GUARD, BOX, component("a", owns=(("odom", "base"),))).feed(
         Clear(), Remember({"x": 1})
     )

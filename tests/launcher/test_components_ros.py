@@ -135,7 +135,7 @@ def has_requests(log: Path, count: int) -> bool:
     return log.exists() and len(requested(log)) == count
 
 
-def found(notices: list[Notice]) -> list[Finding]:
+def findings_in(notices: list[Notice]) -> list[Finding]:
     return [notice.found for notice in notices if isinstance(notice, FindingShown)]
 
 
@@ -152,11 +152,11 @@ def are_ready(notices: list[Notice]) -> bool:
 
 
 def has_found(code: str) -> Step:
-    return lambda notices: any(finding.code == code for finding in found(notices))
+    return lambda notices: any(finding.code == code for finding in findings_in(notices))
 
 
 @pytest.mark.usefixtures("domain")
-def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_edges(
+def test_components_load_return_with_their_container_and_own_their_edges(
     tmp_path: Path, stand_in: Path
 ) -> None:
     """Names, parameters and remappings are as launch gives them."""
@@ -173,7 +173,7 @@ def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_e
             and states(notices, "rectify")[-1] == "running"
         )
         if is_back:
-            assert found(notices) == [], (
+            assert findings_in(notices) == [], (
                 "an edge of a component is its owner's, though the container sends it"
             )
             fakes.moving(fakes.node("thief"), "odom base_link")
@@ -183,7 +183,7 @@ def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_e
         notices = run(tmp_path, ROBOT, kill, steal, has_found("TF801"))
     finally:
         fakes.close()
-    expect(found(notices)[0], "TF801", "/thief", "odometry", "(/robot1/odometry)")
+    expect(findings_in(notices)[0], "TF801", "/thief", "odometry", "(/robot1/odometry)")
     for name in ("rectify", "odometry"):
         assert states(notices, name) == ["starting", "running", "stopped", "starting", "running"]
     first, second = requested(stand_in)[:2], requested(stand_in)[2:]
@@ -218,13 +218,13 @@ def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_e
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_component_that_cannot_be_loaded_is_named_with_the_containers_words(
+def test_a_failed_component_is_named_with_the_containers_text(
     tmp_path: Path, stand_in: Path
 ) -> None:
     notices = run(tmp_path, ROBOT.replace("demo::Empty", "demo::Missing"), has_found("TF808"))
     assert requested(stand_in)
     expect(
-        found(notices)[0],
+        findings_in(notices)[0],
         "TF808",
         "rectify",
         "/robot1/box",
@@ -257,7 +257,7 @@ def test_components_are_unloaded_from_a_container_that_is_external(
         2,
         1,
     ]
-    assert found(notices) == []
+    assert findings_in(notices) == []
 
 
 def test_a_component_whose_node_a_container_has_already_is_refused(
@@ -280,7 +280,7 @@ def test_a_component_whose_node_a_container_has_already_is_refused(
         container.close()
     notices = run(tmp_path, EXTERNAL, has_found("TF808"))
     expect(
-        found(notices)[0],
+        findings_in(notices)[0],
         "TF808",
         "rectify",
         "/robot1/front/rectify",
@@ -291,7 +291,7 @@ def test_a_component_whose_node_a_container_has_already_is_refused(
     assert len(requested(theirs)) == 1
 
 
-def test_without_a_launcher_the_guard_loads_also_into_a_container_that_was_started_again(
+def test_without_a_launcher_the_guard_loads_into_a_restarted_container(
     tmp_path: Path, stand_in: Path, domain: Domain
 ) -> None:
     del domain
@@ -340,4 +340,4 @@ processes:
 @pytest.mark.usefixtures("domain")
 def test_the_containers_of_rclcpp_components_load_a_component(tmp_path: Path) -> None:
     notices = run(tmp_path, STOCK, are_ready)
-    assert found(notices) == []
+    assert findings_in(notices) == []

@@ -12,7 +12,7 @@ from socket import AF_UNIX, socket
 import pytest
 
 from tfcompose.launcher import answers
-from tfcompose.launcher.answers import answer
+from tfcompose.launcher.answers import CommandInputs, answer
 from tfcompose.launcher.control import LONGEST_REQUEST, Control
 from tfcompose.launcher.events import NewPlan
 from tfcompose.launcher.state import initial
@@ -73,7 +73,7 @@ def connection(tmp_path: Path) -> Iterator[Connection]:
 @pytest.mark.parametrize(
     "line", [b"{", b"[" * 50_000, b"\xff\xfe", b"7", b'{"request": []}', b'"\\ud800"', b"\0"]
 )
-def test_what_is_no_request_is_answered_with_an_error_and_the_next_is_heard(
+def test_an_invalid_request_gets_an_error_and_the_next_is_heard(
     connection: Connection, line: bytes
 ) -> None:
     assert "error" in json.loads(connection.ask(line + b"\n"))
@@ -103,6 +103,10 @@ def plan_file(folder: Path, kind: str) -> str:
     )
 
 
+def setting(folder: Path) -> CommandInputs:
+    return CommandInputs(folder / "old.json", None, {}, lambda base, *_, **__: dict(base))
+
+
 @pytest.mark.parametrize(
     "kind", ["device", "NUL", "nothing", "pipe", "folder", "large", "bytes", "blocks"]
 )
@@ -111,9 +115,7 @@ def test_a_plan_that_cannot_be_read_is_refused_at_once(
 ) -> None:
     monkeypatch.setattr(answers, "MOST_PLAN_BYTES", 1000)
     request = UpdateRequest(plan_file(tmp_path, kind), str(tmp_path))
-    refused, event, commands = answer(
-        request, initial(PLAN), tmp_path / "old.json", {}, lambda base, *_, **__: dict(base)
-    )
+    refused, event, commands = answer(request, initial(PLAN), setting(tmp_path))
     assert isinstance(refused, Refusal)
     assert (event, commands) == (None, None)
 
@@ -123,11 +125,7 @@ def test_a_plan_whose_lines_moved_is_followed_and_the_same_plan_is_not(tmp_path:
     for digest, is_followed in (("moved", True), (PLAN.spec_digest, False)):
         file.write_text(write_plan(replace(PLAN, spec_digest=digest)))
         change, event, _ = answer(
-            UpdateRequest(str(file), str(tmp_path)),
-            initial(PLAN),
-            tmp_path / "old.json",
-            {},
-            lambda base, *_, **__: dict(base),
+            UpdateRequest(str(file), str(tmp_path)), initial(PLAN), setting(tmp_path)
         )
         assert change == PlanChange((), (), (), (), differs=is_followed)
         assert isinstance(event, NewPlan) == is_followed
@@ -147,7 +145,5 @@ def test_a_plan_whose_reader_would_wait_is_refused(
     (tmp_path / "plan.json").touch()
     monkeypatch.setattr(os, "fdopen", lambda *_: _Waiting())
     request = UpdateRequest(str(tmp_path / "plan.json"), str(tmp_path))
-    refused, *_ = answer(
-        request, initial(PLAN), tmp_path / "old.json", {}, lambda base, *_, **__: dict(base)
-    )
+    refused, *_ = answer(request, initial(PLAN), setting(tmp_path))
     assert isinstance(refused, Refusal)

@@ -40,7 +40,7 @@ def arguments_of(unit: Path) -> list[str]:
     return words[3:]
 
 
-def test_a_foreign_process_is_its_own_supervised_process_with_the_plans_environment(
+def test_a_foreign_process_is_supervised_in_the_plans_environment(
     units: Path, start: Callable[..., Started]
 ) -> None:
     hello = start(*arguments_of(units / "rover-hello.service"))
@@ -51,11 +51,11 @@ def test_a_foreign_process_is_its_own_supervised_process_with_the_plans_environm
 
 
 @pytest.mark.parametrize(
-    ("name", "shown", "code"),
+    ("name", "expected", "code"),
     [("nobody", "has no process nobody", 2), ("missing", "no-such-program of missing", 1)],
 )
 def test_what_cannot_be_started_is_reported(
-    name: str, shown: str, code: int, units: Path, start: Callable[..., Started]
+    name: str, expected: str, code: int, units: Path, start: Callable[..., Started]
 ) -> None:
     plan = units.parent / "plan.json"
     text = (
@@ -66,5 +66,5 @@ def test_what_cannot_be_started_is_reported(
     plan.write_text(text, "utf-8")
     run = start("exec", plan, name)
     assert run.process.wait(60) == code
-    assert until(lambda: shown in "".join(run.errors)), run.errors
+    assert until(lambda: expected in "".join(run.errors)), run.errors
     assert "Traceback" not in "".join(run.errors)

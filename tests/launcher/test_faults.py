@@ -180,7 +180,7 @@ def program(name: str, code: str, **more: Any) -> PlanProcess:
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_a_flood_blocks_neither_its_writer_nor_anybody_else_and_takes_little_memory_and_disk(
+def test_a_flood_blocks_no_process_and_takes_little_memory_and_disk(
     launch: Callable[..., Run], tmp_path: Path
 ) -> None:
     run = launch(program("flood", FLOOD), program("calm", SLEEPER))
@@ -245,7 +245,7 @@ def test_a_daemon_that_left_its_group_ends_with_the_run(
 
 
 @pytest.mark.parametrize("how", ["restart", "stop"])
-def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_again(
+def test_a_process_outside_its_group_ends_with_its_stopped_process(
     launch: Callable[..., Run], tmp_path: Path, how: Verb
 ) -> None:
     """A process that ignores signals ends before its successor begins.
@@ -399,7 +399,7 @@ def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
     assert stamps != sorted(stamps), "the clock did go back"
 
 
-def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(
+def test_a_socket_left_by_a_killed_launcher_does_not_block_the_next(
     launch: Callable[..., Run],
 ) -> None:
     first = launch(program("a", SLEEPER))

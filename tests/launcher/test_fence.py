@@ -94,7 +94,7 @@ def moved(command: ChildCommand) -> dict[str, str]:
 # By partition.
 
 
-def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_alone_read_it(
+def test_a_strict_plan_fences_its_children_and_only_the_guard_reads_them(
     tmp_path: Path,
 ) -> None:
     slam = PlanProcess(
@@ -165,8 +165,8 @@ def test_a_strict_guard_receives_nothing_of_what_it_sends_itself(
 ) -> None:
     (tmp_path / "own.xml").write_text(users)
     named = str(tmp_path / "own.xml") if users else ""
-    commands, found = inspect(tmp_path, SLAM, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=named)
-    assert found == []
+    commands, findings = inspect(tmp_path, SLAM, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=named)
+    assert findings == []
     assert participant_properties(commands["guard"]) == expected
     assert IGNORES_ITSELF not in participant_properties(commands["slam"]) or "false" in users
 
@@ -279,11 +279,11 @@ BAD_PROFILES = (
 def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
     tmp_path: Path, remap: dict[str, str], env: dict[str, str], names: list[str]
 ) -> None:
-    own = tmp_path / "own.xml"
+    own_profile = tmp_path / "own.xml"
     for name, value in env.items():
         if value in BAD_PROFILES:
-            own.write_text(value)
-            env = {name: str(own)}
+            own_profile.write_text(value)
+            env = {name: str(own_profile)}
     both = [
         PlanProcess(name, "run", argv=("true",), remap=remap, owns=(("map", name),))
         for name in ("slam", "drive")
@@ -343,7 +343,7 @@ def test_the_way_can_be_chosen(tmp_path: Path) -> None:
     assert inspect(tmp_path, SLAM, GUARD)[0]["slam"].fence
 
 
-def test_remappings_come_before_those_of_the_plan_and_catch_what_is_sent_on_its_topics(
+def test_fence_remappings_precede_the_plans_and_catch_its_topics(
     tmp_path: Path,
 ) -> None:
     argv = (

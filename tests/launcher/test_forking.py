@@ -40,7 +40,7 @@ os.set_inheritable(file.fileno(), True)
 theirs, ours = os.pipe()
 def start(way, code):
     env = os.environ | {"TFCOMPOSE_RUN": "rover@7", "ROS_DOMAIN_ID": "7"}
-    command = ChildCommand((*forking.HERE, code), env, Path.cwd(), own=True)
+    command = ChildCommand((*forking.HERE, code), env, Path.cwd(), is_built_in=True)
     if way == "executed":
         return spawn(command, (theirs,))
     if way == "the kernel refuses":
@@ -182,7 +182,7 @@ ENVIRONMENT = dict(os.environ)
         pytest.param({"env": {"ROS_DOMAIN_ID": "7"}}, True, id="read when ROS begins"),
         pytest.param({"env": {"LD_LIBRARY_PATH": "/opt/lib"}}, False, id="read before"),
         pytest.param({"env": {"RMW_IMPLEMENTATION": "rmw_x"}}, False, id="a library of ROS"),
-        pytest.param({"own": False}, False, id="not our own"),
+        pytest.param({"is_built_in": False}, False, id="not our own"),
         pytest.param({"argv": ("/usr/bin/gdb", *HERE, "static")}, False, id="a prefix"),
         pytest.param({"process": replace(STATIC, emulate_tty=True)}, False, id="a terminal"),
         pytest.param(
@@ -194,13 +194,13 @@ def test_what_needs_a_program_that_begins_anew_is_executed(
     forker: Forker, change: dict[str, Any], *, is_forked: bool
 ) -> None:
     env = ENVIRONMENT | change.get("env", {})
-    command = ChildCommand((*HERE, "static"), env, Path("/"), own=True, process=STATIC)
+    command = ChildCommand((*HERE, "static"), env, Path("/"), is_built_in=True, process=STATIC)
     changed = replace(command, **(change | {"env": env}))
     assert forker.can_start(changed) is is_forked
 
 
 def test_a_launcher_with_another_thread_forks_nothing(forker: Forker) -> None:
-    command = ChildCommand((*HERE, "static"), ENVIRONMENT, Path("/"), own=True)
+    command = ChildCommand((*HERE, "static"), ENVIRONMENT, Path("/"), is_built_in=True)
     assert forker.can_start(command)
     ends = threading.Event()
     thread = threading.Thread(target=ends.wait)

@@ -109,9 +109,9 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
     def report(notice: Notice) -> None:
         notices.append(notice)
         shut = [
-            shown
-            for shown in notices
-            if isinstance(shown, FindingShown) and shown.found.code == "TF817"
+            late_notice
+            for late_notice in notices
+            if isinstance(late_notice, FindingShown) and late_notice.found.code == "TF817"
         ]
         if isinstance(notice, AllReady) or (late and len(shut) == late):
             raise BrokenPipeError  # enough was seen
@@ -173,7 +173,7 @@ def test_each_kind_of_gate_opens_says_what_it_saw_and_what_waits_follows(tmp_pat
 @pytest.mark.usefixtures("domain")
 def test_gates_that_stay_shut_report_what_was_there_instead(tmp_path: Path) -> None:
     scan = Ready("topic", "/robot/scam", timeout_s=9.0)
-    other = Ready("topic", "/front/scan", timeout_s=9.0)
+    ready = Ready("topic", "/front/scan", timeout_s=9.0)
     active = Ready("lifecycle", "active", timeout_s=10.0)
     slam = node("slam", "lifecycle", "fail", lifecycle={"/robot/slam": "active"}, ready=active)
     requested = Ready("service", "/robot/asked_for", timeout_s=9.0)
@@ -183,20 +183,20 @@ def test_gates_that_stay_shut_report_what_was_there_instead(tmp_path: Path) -> N
             node("lidar", ready=scan),
             slam,
             script("calm", "sleep 180", requested),
-            script("c", "sleep 180", other),
+            script("c", "sleep 180", ready),
         ),
         late=4,
     )
-    found = late_of(notices)
-    expect(found["lidar"], "TF817", " 9 s", "/robot/scam", "/robot/scan")
+    findings = late_of(notices)
+    expect(findings["lidar"], "TF817", " 9 s", "/robot/scam", "/robot/scan")
     expect(
-        found["c"], "TF817", "/front/scan", "topics /robot/scan, "
+        findings["c"], "TF817", "/front/scan", "topics /robot/scan, "
     )  # the same name elsewhere comes first
     expect(
-        found["calm"],
+        findings["calm"],
         "TF817",
         "/robot/asked_for",
         "services /robot/reset, /robot/slam/change_state, ",
     )
-    assert "asked_for" not in found["calm"].notes[0].message, "nobody offers it"
-    expect(found["slam"], "TF817", " 10 s", "/robot/slam", "unconfigured", "slam: configured")
+    assert "asked_for" not in findings["calm"].notes[0].message, "nobody offers it"
+    expect(findings["slam"], "TF817", " 10 s", "/robot/slam", "unconfigured", "slam: configured")

@@ -46,7 +46,7 @@ def observing_until(file: str) -> PlanProcess:
 
 
 @pytest.mark.parametrize(("sent", "ends"), [(GO, False), (b"", True), (b"no", True)])
-def test_a_held_process_goes_on_at_the_order_and_ends_when_nobody_is_left_to_give_it(
+def test_a_held_process_continues_on_order_and_ends_without_a_launcher(
     monkeypatch: pytest.MonkeyPatch,
     sent: bytes,
     ends: bool,  # noqa: FBT001 (a parameter of the test)
@@ -82,7 +82,7 @@ def _fake_node(calls: list[str]) -> Iterator[object]:
     yield object()
 
 
-def test_a_held_publisher_joins_ros_and_sends_nothing_before_it_is_released(
+def test_a_held_publisher_joins_ros_and_sends_nothing_before_its_release(
     monkeypatch: pytest.MonkeyPatch, write: Callable[..., Path]
 ) -> None:
     node = pytest.importorskip("tfcompose.tf.ros.node")
@@ -107,7 +107,7 @@ def test_a_held_publisher_joins_ros_and_sends_nothing_before_it_is_released(
     assert calls == ["joined", "publisher", "held"]
 
 
-def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_started(
+def test_own_publishers_load_while_the_guard_observes_and_resume_at_start(
     tmp_path: Path,
 ) -> None:
     notices: list[tuple[float, Notice]] = []
@@ -138,12 +138,12 @@ def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_st
         if isinstance(kind, ProcessState) and kind.process == "static" and kind.pid
     }
     assert pids == {int(output[loaded].split()[1])}
-    others = [
+    start_times = [
         i
         for i, kind in enumerate(kinds)
         if isinstance(kind, ProcessState) and kind.process == "other"
     ]
-    assert others[0] > loaded
+    assert start_times[0] > loaded
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
@@ -174,7 +174,7 @@ def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: 
     assert not psutil.Process().children(recursive=True)
 
 
-def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(
+def test_a_process_that_died_in_hold_ends_nothing_when_the_guard_dies(
     tmp_path: Path,
 ) -> None:
     notices: list[Notice] = []

@@ -25,6 +25,7 @@ from tfcompose.model.plan import Plan, PlanProcess, RosSettings, Schedule
 from tfcompose.tf.ros.environment import child_environment
 from tfcompose.tools.exporters.kubernetes import Cluster, kubernetes
 from tfcompose.tools.exporters.launch import launch
+from tfcompose.tools.exporters.launch_frontends import LaunchFile
 from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 if TYPE_CHECKING:
@@ -146,10 +147,10 @@ def test_a_key_reaches_the_plan_the_process_and_other_supervisors(
 
 
 @pytest.mark.parametrize("key", CASES)
-def test_launch_starts_what_has_such_a_key_by_the_launcher_and_a_pod_names_it(key: str) -> None:
+def test_launch_starts_such_a_process_by_the_launcher_and_a_pod_names_it(key: str) -> None:
     process = process_with(key, CASES[key])
     plan = Plan("r", "", None, RosSettings(), (), (process,))
-    text = "".join(file.text for file in launch(plan, Machine("/plan"), "<robot/>")[0])
+    text = "".join(file.text for file in launch(plan, LaunchFile("/plan"), "<robot/>")[0])
     assert 'process("p"' in text
     gaps = kubernetes(plan, Cluster("image"), {"plan.json": ""})[1]
     assert any(key in gap for gap in gaps) == (key != "schedule")

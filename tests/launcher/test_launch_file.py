@@ -66,12 +66,17 @@ def inspect(
     return commands, findings[0] if findings else None
 
 
-@pytest.mark.parametrize(("own", "namespace"), [(None, "r"), ("r/nav", "r/nav")])
-def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
-    tmp_path: Path, env: dict[str, str], own: str | None, namespace: str
+@pytest.mark.parametrize(("own_namespace", "namespace"), [(None, "r"), ("r/nav", "r/nav")])
+def test_an_include_has_namespace_remappings_sim_time_and_arguments(
+    tmp_path: Path, env: dict[str, str], own_namespace: str | None, namespace: str
 ) -> None:
     plan = Plan(
-        "rover", "", None, RosSettings("r", clock="sim"), (), (replace(NAV2, namespace=own),)
+        "rover",
+        "",
+        None,
+        RosSettings("r", clock="sim"),
+        (),
+        (replace(NAV2, namespace=own_namespace),),
     )
     notices: list[Notice] = []
     assert supervise(plan, tmp_path / "plan.json", report=notices.append, base_env=env) == 0
@@ -102,7 +107,7 @@ def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
 @pytest.mark.parametrize(
     ("theirs", "output"), [({}, "both"), ({"OVERRIDE_LAUNCH_PROCESS_OUTPUT": "log"}, "log")]
 )
-def test_output_of_nodes_comes_to_the_log_unless_the_user_sends_it_elsewhere(
+def test_output_of_nodes_goes_to_the_log_unless_the_user_redirects_it(
     tmp_path: Path, env: dict[str, str], theirs: dict[str, str], output: str
 ) -> None:
     env.pop("OVERRIDE_LAUNCH_PROCESS_OUTPUT", None)

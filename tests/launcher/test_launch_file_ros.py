@@ -78,7 +78,7 @@ def package(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("how", ["is told to end", "is killed"])
-def test_its_nodes_have_the_plans_namespace_remappings_clock_and_arguments_and_end_with_it(
+def test_its_nodes_take_the_plans_settings_and_end_with_it(
     package: Path, start: Callable[..., Started], how: str
 ) -> None:
     paths = os.pathsep.join(

@@ -55,7 +55,7 @@ def test_processes_of_parts_have_logs_too(tmp_path: Path) -> None:
         ] == f"line 9 of {name}"
 
 
-def test_the_run_that_wrote_last_is_known_by_its_lines_and_not_by_when_its_files_were_made(
+def test_lines_and_not_file_times_tell_the_latest_run(
     tmp_path: Path,
 ) -> None:
     begun, later = Logs(tmp_path / "a"), Logs(tmp_path / "b")
@@ -151,8 +151,8 @@ def test_a_folder_that_is_a_link_gets_no_logs(tmp_path: Path, process: str) -> N
 def test_another_users_folder_gets_no_logs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own = os.geteuid()
-    monkeypatch.setattr(os, "geteuid", lambda: own + 1)
+    own_uid = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: own_uid + 1)
     assert "another user" in (Logs(tmp_path).write("a", "text") or "")
     assert list(tmp_path.iterdir()) == []
 

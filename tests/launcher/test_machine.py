@@ -26,7 +26,9 @@ from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import initial
 from tfcompose.model.messages import (
     Clear,
+    EdgeTaken,
     Ended,
+    FilterBypassed,
     FindingShown,
     Live,
     Missing,
@@ -35,9 +37,7 @@ from tfcompose.model.messages import (
     ProcessRequest,
     RecoveredShown,
     Stopping,
-    Taken,
     TreeComplete,
-    Unfenced,
     Waiting,
 )
 from tfcompose.model.plan import GuardPolicy, PlanProcess, Ready, StopRule
@@ -51,9 +51,7 @@ WARNING = finding("TF803", "nobody declared base_link → thing", None, severity
 # The start.
 
 
-def test_the_guard_is_started_first_and_the_rest_only_after_it_is_clear_in_the_plans_order() -> (
-    None
-):
+def test_the_guard_starts_first_and_the_rest_in_plan_order_once_clear() -> None:
     history = begin(SLAM, STATIC, GUARD)
     assert history.started == ["guard"]
     history.wait(19)
@@ -62,7 +60,7 @@ def test_the_guard_is_started_first_and_the_rest_only_after_it_is_clear_in_the_p
     assert history.started == ["guard", "slam", "static"]
 
 
-def test_what_the_guard_waits_for_is_started_before_it_and_the_guard_once_that_is_ready() -> None:
+def test_dependencies_of_the_guard_start_first_and_the_guard_once_ready() -> None:
     router = PlanProcess("router", "run", ready=Ready("log", "listens"))
     history = begin(SLAM, router, replace(GUARD, after={"router": "ready"}))
     assert history.started == ["router"]
@@ -83,11 +81,11 @@ def test_without_a_guard_everything_starts_at_once() -> None:
     assert begin(SLAM, STATIC).started == ["slam", "static"]
 
 
-def test_a_guard_that_is_off_is_not_waited_for_and_still_says_what_is_live_and_ready() -> None:
+def test_a_disabled_guard_is_not_awaited_and_reports_live_and_ready() -> None:
     off, waits = GuardPolicy(mode="off"), run_process("b", after={"slam": "ready"})
     history = begin(SLAM, GUARD, waits, guard=off)
     assert history.started == ["guard", "slam"]
-    assert history.wait(60).found() == []
+    assert history.wait(60).findings() == []
     history.feed(Live("slam", ("odom",)), OwnerReady("slam"), TreeComplete(1))
     assert history.started == ["guard", "slam", "b"]
     assert (
@@ -102,7 +100,7 @@ def test_an_external_process_is_expected_and_not_started() -> None:
     assert history.started == ["slam"]
 
 
-def test_a_guard_that_does_not_say_clear_within_20_s_is_a_failure_that_says_so() -> None:
+def test_a_guard_that_is_not_clear_within_20_s_is_a_named_failure() -> None:
     history = begin(GUARD, SLAM)
     assert history.sleep_until_due() == pytest.approx(20)
     expect(history.only(), "TF808", "guard", " 20 s ")
@@ -122,18 +120,18 @@ def test_a_guard_that_dies_before_it_is_clear_is_a_failure_that_says_so() -> Non
     assert history.exit_code == 1
 
 
-def test_an_edge_that_is_taken_already_is_shown_and_nothing_else_is_started() -> None:
-    other = finding("TF807", "somebody publishes b", None)
+def test_an_edge_already_taken_is_shown_and_nothing_else_starts() -> None:
+    second = finding("TF807", "somebody publishes b", None)
     taken = finding("TF807", "stranger publishes base_link → laser already", None)
-    history = begin(GUARD, STATIC).feed(Taken(taken), Taken(other), Clear())
-    assert history.found() == [taken, other]
+    history = begin(GUARD, STATIC).feed(EdgeTaken(taken), EdgeTaken(second), Clear())
+    assert history.findings() == [taken, second]
     assert history.killed == [("guard", SIGINT)]
     assert history.all(Stopping) == [Stopping("TF807 edge_taken_before_start")]
     assert history.feed(Exited("guard", 0)).exit_code == 1
     assert history.started == ["guard"]
 
 
-def test_a_process_that_cannot_be_started_ends_everything_with_exit_1_and_is_named() -> None:
+def test_a_process_that_cannot_start_is_named_and_ends_everything_with_1() -> None:
     history = begin(STATIC, SLAM).feed(StartFailed("slam", "Permission denied"))
     expect(history.only(), "TF808", "slam", "Permission denied")
     assert history.killed == [("static", SIGINT)]
@@ -156,7 +154,7 @@ def test_a_process_is_started_when_the_operating_system_has_confirmed_it() -> No
     assert Start("b") in step(state, Started("a", 7), 0.1)[1]
 
 
-def test_after_ready_waits_for_the_guards_word_also_for_an_external_process() -> None:
+def test_after_ready_awaits_the_guard_even_for_an_external_process() -> None:
     a, b = run_process("a", after={"drive": "ready"}), run_process("b", after={"slam": "ready"})
     history = begin(GUARD, a, b, DRIVE, SLAM).feed(Clear())
     assert history.started == ["guard", "slam"]
@@ -208,26 +206,26 @@ def test_a_built_in_process_that_ends_has_failed_even_with_exit_code_0(
 def test_a_program_that_ends_with_0_is_done_and_the_others_go_on() -> None:
     history = begin(STATIC, SLAM).feed(Exited("slam", 0))
     assert history.states("slam")[-1] == "exited"
-    assert (history.found(), history.killed, history.exit_code) == ([], [], None)
+    assert (history.findings(), history.killed, history.exit_code) == ([], [], None)
 
 
-def test_a_required_program_that_others_wait_for_until_it_is_done_may_end_with_0() -> None:
+def test_a_required_program_that_others_await_may_end_with_0() -> None:
     """A spawner of controllers: it loads one, ends, and what drives starts then."""
     drive = run_process("drive", after={"spawner": "done"})
     spawners = (
         run_process("spawner", required=True),
         run_process("spawner", required=True, ready=Ready("exit")),
     )
-    for spawner, others in zip(spawners, ((drive,), ()), strict=True):
-        history = begin(spawner, STATIC, *others).feed(Exited("spawner", 0))
-        assert (history.found(), history.exit_code) == ([], None)
+    for spawner, waiting in zip(spawners, ((drive,), ()), strict=True):
+        history = begin(spawner, STATIC, *waiting).feed(Exited("spawner", 0))
+        assert (history.findings(), history.exit_code) == ([], None)
         assert history.started == [
             "spawner",
             "static",
-            *(other_process.name for other_process in others),
+            *(process.name for process in waiting),
         ]
-    for code, others in ((0, ()), (1, (drive,))):
-        history = begin(spawners[0], STATIC, *others).feed(Exited("spawner", code))
+    for code, waiting in ((0, ()), (1, (drive,))):
+        history = begin(spawners[0], STATIC, *waiting).feed(Exited("spawner", code))
         expect(history.only(), "TF808", "spawner", f"exit code {code}")
 
 
@@ -273,7 +271,7 @@ def test_a_run_of_10_s_makes_earlier_failures_forgotten() -> None:
     assert history.sleep_until_due() == pytest.approx(1)
 
 
-def test_on_failure_leaves_a_program_that_is_done_and_always_starts_it_again() -> None:
+def test_on_failure_leaves_a_finished_program_and_always_restarts_it() -> None:
     history = begin(
         run_process("a", restart="on-failure"), run_process("b", restart="always"), STATIC
     )
@@ -281,7 +279,7 @@ def test_on_failure_leaves_a_program_that_is_done_and_always_starts_it_again() -
     assert (history.states("a")[-1], history.states("b")[-1]) == ("exited", "backoff")
 
 
-def test_a_process_that_waits_for_its_restart_is_not_started_once_everything_stops() -> None:
+def test_a_process_that_awaits_its_restart_does_not_start_during_a_stop() -> None:
     history = (
         begin(run_process("a", restart="always"), STATIC)
         .feed(Exited("a", 1), Signalled(SIGINT))
@@ -310,23 +308,21 @@ def test_a_violation_ends_everything_with_exit_1_where_the_policy_is_stop() -> N
     )
     assert history.killed == []
     history.feed(FindingShown(ERROR))
-    assert history.found() == [WARNING, ERROR]
+    assert history.findings() == [WARNING, ERROR]
     assert history.all(Stopping) == [Stopping("TF801 foreign_publisher")]
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
 
 
-def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop_offender() -> (
-    None
-):
+def test_policy_stop_offender_stops_the_plans_own_offender_for_good() -> None:
     policy = GuardPolicy(on_violation="stop-offender")
     history = begin(GUARD, STATIC, run_process("slam", restart="always"), guard=policy).feed(
         Clear()
     )
     history.feed(FindingShown(WARNING, "slam"), FindingShown(ERROR))
-    assert (history.killed, history.found()) == ([], [WARNING, ERROR])
+    assert (history.killed, history.findings()) == ([], [WARNING, ERROR])
     history.feed(FindingShown(ERROR, "slam"))
     assert history.killed == [("slam", SIGINT)]
-    expect(history.found()[-1], "TF801", "slam is stopped")
+    expect(history.findings()[-1], "TF801", "slam is stopped")
     history.feed(Exited("slam", -SIGINT)).wait(60)
     assert (history.started, history.states("slam")[-1], history.exit_code) == (
         ["guard", "static", "slam"],
@@ -334,42 +330,40 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
         None,
     )
     expect(
-        history.feed(FindingShown(ERROR, "slam")).found()[-1],
+        history.feed(FindingShown(ERROR, "slam")).findings()[-1],
         "TF801",
         "nothing is stopped",
         "slam",
     )
 
 
-def test_a_process_past_the_fence_is_stopped_where_violations_are_only_reported() -> None:
+def test_a_process_past_the_fence_is_stopped_even_under_policy_report() -> None:
     history = begin(GUARD, STATIC, run_process("slam", restart="always")).feed(
-        Clear(), Unfenced(ERROR, "slam")
+        Clear(), FilterBypassed(ERROR, "slam")
     )
     assert history.killed == [("slam", SIGINT)]
-    expect(history.found()[-1], "TF801", "slam is stopped", "strict")
+    expect(history.findings()[-1], "TF801", "slam is stopped", "strict")
     everything = begin(GUARD, STATIC, guard=GuardPolicy(on_violation="stop")).feed(
-        Clear(), Unfenced(ERROR, "static")
+        Clear(), FilterBypassed(ERROR, "static")
     )
     assert everything.all(Stopping) == [Stopping("TF801 foreign_publisher")]
 
 
-def test_a_process_past_the_fence_is_known_by_its_number_where_its_environment_was_cleared() -> (
-    None
-):
+def test_a_number_identifies_a_process_past_the_fence_without_environment() -> None:
     slam, idle = run_process("slam", restart="always"), run_process("idle")
     history = begin(GUARD, STATIC, slam, idle).feed(Clear())
     pid = history.state.tracked["slam"].pid
     assert pid
     history.feed(ProcessRequest("stop", "idle"), Exited("idle", 0))
     for unknown in (0, pid + 1000):
-        history.feed(Unfenced(ERROR, "", unknown))
-        expect(history.found()[-1], "TF801", "nothing is stopped")
+        history.feed(FilterBypassed(ERROR, "", unknown))
+        expect(history.findings()[-1], "TF801", "nothing is stopped")
     assert [name for name, _ in history.killed] == ["idle"]
     history.killed.clear()
-    expect(history.found()[-1], "TF801", "nothing is stopped", f"kill {pid + 1000}")
-    history.feed(Unfenced(ERROR, "", pid))
+    expect(history.findings()[-1], "TF801", "nothing is stopped", f"kill {pid + 1000}")
+    history.feed(FilterBypassed(ERROR, "", pid))
     assert history.killed == [("slam", SIGINT)]
-    expect(history.found()[-1], "TF801", "slam is stopped", "strict")
+    expect(history.findings()[-1], "TF801", "slam is stopped", "strict")
 
 
 def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:
@@ -377,17 +371,17 @@ def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:
         Clear()
     )
     history.feed(FindingShown(ERROR, "drive"))
-    expect(history.found()[-1], "TF801", "nothing is stopped", "drive")
+    expect(history.findings()[-1], "TF801", "nothing is stopped", "drive")
     assert history.killed == []
 
 
 def test_a_violation_is_only_shown_where_the_policy_is_report() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), FindingShown(ERROR))
-    assert history.found() == [ERROR]
+    assert history.findings() == [ERROR]
     assert (history.killed, history.exit_code) == ([], None)
 
 
-def test_missing_edges_are_named_after_5_s_and_again_only_when_there_are_others() -> None:
+def test_missing_edges_are_named_after_5_s_and_again_only_if_they_change() -> None:
     history = begin(GUARD, STATIC, SLAM).wait(3).feed(Clear())
     assert history.sleep_until_due() == pytest.approx(5)
     assert [[gap.owner for gap in notice.missing] for notice in history.all(Waiting)] == [
@@ -417,7 +411,7 @@ def test_two_notices_of_missing_edges_are_5_s_apart() -> None:
 
 
 @pytest.mark.parametrize("number", [SIGINT, SIGTERM, SIGHUP])
-def test_a_signal_stops_everything_in_reverse_order_the_guard_last_and_the_exit_code_is_0(
+def test_a_signal_stops_all_in_reverse_order_the_guard_last_with_exit_0(
     number: int,
 ) -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Signalled(number))
@@ -467,13 +461,15 @@ def test_the_first_ctrl_c_while_a_failure_ends_everything_changes_nothing() -> N
 def test_what_the_guard_says_while_everything_stops_is_not_shown() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), Signalled(SIGINT))
     notices = len(history.notices)
-    history.feed(FindingShown(ERROR), Taken(ERROR), TreeComplete(1), Live("static", ("laser",)))
+    history.feed(
+        FindingShown(ERROR), EdgeTaken(ERROR), TreeComplete(1), Live("static", ("laser",))
+    )
     assert history.notices[notices:] == []
     assert history.feed(Exited("static", 1), Exited("guard", 1)).exit_code == 0
-    assert history.found() == []
+    assert history.findings() == []
 
 
-def test_a_process_that_was_being_started_when_the_stop_came_is_stopped_too() -> None:
+def test_a_process_starting_at_the_stop_is_stopped_too() -> None:
     plan = plan_of(STATIC)
     state, _ = step(initial(plan), Begin(), 0.0)
     state, actions = step(state, Signalled(SIGINT), 0.1)
@@ -508,14 +504,14 @@ def test_time_is_up_ends_with_1_when_an_error_was_shown() -> None:
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
 
 
-def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_observed() -> None:
+def test_a_timeout_ends_with_1_and_names_the_edges_never_observed() -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("static", ("laser",)), TimeUp())
     expect(history.only(), "TF811", "slam", "map → odom")
     history.feed(Exited("slam", 0), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 1
 
 
-def test_a_process_that_was_stopped_is_not_reported_to_have_never_published() -> None:
+def test_a_stopped_process_is_not_reported_as_never_published() -> None:
     slam = replace(SLAM, argv=("slam",))
     history = begin(GUARD, STATIC, slam).feed(
         Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), TreeComplete(2)
@@ -527,7 +523,7 @@ def test_a_process_that_was_stopped_is_not_reported_to_have_never_published() ->
 def test_a_process_that_was_never_started_is_not_blamed_for_its_edges() -> None:
     slam = replace(SLAM, after={"drive": "ready"})
     history = begin(GUARD, STATIC, slam, DRIVE).feed(Clear(), TimeUp())
-    static, slam_, drive = history.found()
+    static, slam_, drive = history.findings()
     expect(static, "TF811", "static", "base_link → laser")
     expect(slam_, "TF811", "map → odom", "slam", "drive")
     expect(drive, "TF811", "drive", "odom → base_link")

@@ -29,15 +29,15 @@ def optional(name: str = "camera", **more: Any) -> PlanProcess:
     return run_process(name, required=False, **more)
 
 
-def failed(*others: PlanProcess) -> History:
+def failed(*processes: PlanProcess) -> History:
     """Return a history in which the optional camera has failed, and the tree is live."""
-    return begin(GUARD, STATIC, optional(), *others).feed(
+    return begin(GUARD, STATIC, optional(), *processes).feed(
         Clear(), *LIVE, Exited("camera", 3, ("no device",))
     )
 
 
 @pytest.mark.parametrize("restart", ["no", "on-failure"])
-def test_an_optional_process_that_fails_is_named_with_its_last_lines_and_the_rest_goes_on(
+def test_a_failed_optional_process_is_named_with_its_last_lines(
     restart: RestartPolicy,
 ) -> None:
     history = begin(STATIC, replace(optional(), restart=restart, max_restarts=0)).feed(
@@ -72,10 +72,10 @@ def test_one_that_the_operating_system_does_not_start_is_given_up_too() -> None:
 
 def test_one_that_ends_as_it_should_has_not_failed() -> None:
     history = begin(STATIC, optional()).feed(Exited("camera", 0))
-    assert (history.found(), history.state.given_up) == ([], ())
+    assert (history.findings(), history.state.given_up) == ([], ())
 
 
-def test_ready_does_not_wait_for_it_nor_for_its_edges_and_says_what_is_left_out() -> None:
+def test_ready_awaits_neither_it_nor_its_edges_and_reports_its_absence() -> None:
     camera = replace(optional(), owns=(("base_link", "camera"),), restart="always", max_restarts=0)
     history = begin(GUARD, STATIC, camera).feed(Clear(), *LIVE, Exited("camera", 1)).wait(60)
     (ready,) = history.all(AllReady)
@@ -100,19 +100,19 @@ def test_who_waits_for_it_fails_and_ends_everything_unless_optional_too() -> Non
     history = begin(STATIC, camera, run_process("nav", after={"camera": "ready"})).feed(
         Exited("camera", 1)
     )
-    expect(history.found()[1], "TF808", "nav", "camera to be ready", "failed")
+    expect(history.findings()[1], "TF808", "nav", "camera to be ready", "failed")
     assert history.feed(Exited("static", 0)).exit_code == 1
     history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(
         Exited("camera", 1)
     )
-    expect(history.found()[1], "TF808", "nav", "camera to be ready", "failed")
+    expect(history.findings()[1], "TF808", "nav", "camera to be ready", "failed")
     assert (history.state.stop, history.state.given_up) == (None, ("camera", "nav"))
 
 
 @pytest.mark.parametrize(
     ("what", "code", "started"), [("started", 1, 2), ("done", 1, 1), ("done", 0, 2)]
 )
-def test_started_was_fulfilled_by_one_that_ran_and_done_is_not_by_one_that_failed(
+def test_a_failed_process_fulfils_started_if_it_ran_and_never_done(
     what: str, code: int, started: int
 ) -> None:
     history = begin(optional(), optional("nav", after={"camera": what})).feed(
@@ -141,20 +141,18 @@ def test_it_is_started_again_on_request_and_what_waited_for_it_follows() -> None
     assert not [tracked for tracked in history.state.tracked.values() if tracked.failed]
 
 
-def test_after_a_signal_the_exit_code_is_0_and_after_a_time_1_with_the_failure_at_the_end() -> (
-    None
-):
+def test_the_exit_code_is_0_after_a_signal_and_1_after_a_timeout() -> None:
     history = failed().feed(Signalled(SIGINT), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 0
     history = failed().feed(TimeUp(), Exited("static", 0), Exited("guard", 0))
-    (finding,) = history.found()
+    (finding,) = history.findings()
     assert history.all(Ended) == [Ended(1, (finding.message, "camera: no device"))]
 
 
-def test_when_all_have_ended_the_exit_code_is_1_and_the_first_that_failed_is_named() -> None:
+def test_if_all_end_the_exit_code_is_1_and_the_first_failure_is_named() -> None:
     history = begin(optional("a"), optional("b")).feed(Exited("b", 2)).wait(1).feed(Exited("a", 1))
-    assert history.all(Ended) == [Ended(1, (history.found()[0].message,))]
-    expect(history.found()[0], "TF808", "b", "exit code 2")
+    assert history.all(Ended) == [Ended(1, (history.findings()[0].message,))]
+    expect(history.findings()[0], "TF808", "b", "exit code 2")
 
 
 def test_an_optional_process_does_not_hold_back_that_all_is_started() -> None:
@@ -182,7 +180,7 @@ def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:
     assert [event.because[0].split()[0] for event in history.all(Ended)] == ["camera"]
 
 
-def test_a_process_that_was_stopped_on_purpose_does_not_fail_with_what_it_waits_for() -> None:
+def test_a_deliberately_stopped_process_does_not_fail_with_its_dependency() -> None:
     nav = optional("nav", after={"camera": "done"})
     history = begin(STATIC, nav, optional()).feed(ProcessRequest("stop", "nav"))
     history.feed(Exited("camera", 3))

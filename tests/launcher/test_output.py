@@ -34,9 +34,7 @@ def test_a_reader_that_does_not_read_costs_bounded_memory_and_learns_of_it() -> 
     assert lines[-1] == "and on"
 
 
-def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_blocking_one() -> (
-    None
-):
+def test_a_stopped_terminal_blocks_nothing_but_the_shell_keeps_blocking() -> None:
     master, slave = pty.openpty()
     stream = NonBlockingOutput(slave)
     for _ in range(5000):  # a write that waits, waits for ever

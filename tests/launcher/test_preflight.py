@@ -122,7 +122,7 @@ def test_what_cannot_be_started_is_one_finding_with_its_names(
     )
 
 
-def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once(
+def test_everything_missing_is_one_finding_that_lists_folders_once(
     tmp_path: Path,
 ) -> None:
     words = {
@@ -178,9 +178,9 @@ def test_sharing_with_a_fleet_needs_zenoh_before_anything_is_started(
     share = PlanProcess(
         "fleet_share", "run", argv=(*SHARE_COMMAND, "r1", "fleet.yaml"), required=False
     )
-    own = replace(share, name="own", argv=("sh", "-c", "tfcompose fleet share"))
+    own_share = replace(share, name="own", argv=("sh", "-c", "tfcompose fleet share"))
     monkeypatch.setattr("tfcompose.tools.fleet.preflight.find_spec", lambda _: None)
-    _, (finding,) = inspect(tmp_path, share, own)
+    _, (finding,) = inspect(tmp_path, share, own_share)
     expect(finding, "TF920", "fleet_share", "tfcompose[fleet]")
 
 

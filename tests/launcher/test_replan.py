@@ -57,7 +57,6 @@ def test_a_line_that_moved_in_the_file_changes_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("edges", "concerned"),
     [
-        ((edge("laser", x=0.1), edge("odom", "slam")), {"static"}),
         ((edge("laser"), edge("odom", "slam", x=0.1)), {"slam", "guard"}),
         ((edge("laser"), edge("lidar"), edge("odom", "slam")), {"static", "guard"}),
     ],
@@ -70,21 +69,40 @@ def test_an_edge_concerns_its_owner_and_another_one_the_guard(
     )
 
 
+def test_static_follows_a_pose_while_it_runs_and_the_guard_with_it(tmp_path: Path) -> None:
+    moved = replace(PLAN, edges=(edge("laser", x=0.1), edge("odom", "slam")))
+    difference = PlanDifference(
+        frozenset(), (), followers=frozenset({"static"}), moved=("base → laser",)
+    )
+    assert changed(tmp_path, moved) == difference
+    adjusted = replace(moved, edges=(replace(moved.edges[0], earlier=(Pose(),)), moved.edges[1]))
+    assert changed(tmp_path / "adjusted", adjusted) == difference
+
+
+def test_an_edge_that_moves_with_another_one_added_comes_with_the_restart(tmp_path: Path) -> None:
+    edges = (edge("laser", x=0.1), edge("lidar"), edge("odom", "slam"))
+    difference = changed(tmp_path, replace(PLAN, edges=edges))
+    assert difference == PlanDifference(frozenset({"static", "guard"}), ())
+
+
 def test_a_parameter_concerns_its_process_only(tmp_path: Path) -> None:
     assert changed(tmp_path, PLAN, params="a: 2") == PlanDifference(frozenset({"slam"}), ())
 
 
 def test_the_description_concerns_whoever_sends_it(tmp_path: Path) -> None:
     assert changed(tmp_path, PLAN, description="<robot name='r'/>") == PlanDifference(
-        frozenset({"static"}), ()
+        frozenset(), (), followers=frozenset({"static"})
     )
     arm = replace(
         PLAN, processes=(STATIC, JOINTS, GUARD), edges=(edge("laser"), edge("a", "joints"))
     )
     (tmp_path / PLAN.description).write_text("<robot/>")
     (tmp_path / "new").mkdir(exist_ok=True)
-    for plan, concerned in ((arm, "static"), (replace(arm, processes=(JOINTS, GUARD)), "joints")):
-        assert change(plan, tmp_path, plan, tmp_path / "new").changed == {concerned}
+    joints = replace(arm, processes=(JOINTS, GUARD))
+    for plan, follower, changes in ((arm, {"static"}, set()), (joints, set(), {"joints"})):
+        difference = change(plan, tmp_path, plan, tmp_path / "new")
+        assert difference.followers == follower
+        assert difference.changed == changes
 
 
 def test_joints_no_longer_sends_the_description_once_there_is_a_fixed_edge(tmp_path: Path) -> None:
@@ -103,14 +121,14 @@ def test_a_policy_concerns_the_guard_and_a_setting_of_ros_everybody(tmp_path: Pa
     }
 
 
-def test_a_fence_is_put_up_when_a_process_starts_so_strict_concerns_everybody(
+def test_a_fence_goes_up_at_process_start_so_strict_concerns_every_process(
     tmp_path: Path,
 ) -> None:
     strict = replace(PLAN, guard=GuardPolicy(mode="strict"))
     assert changed(tmp_path, strict).changed == {"static", "slam", "guard"}
 
 
-def test_another_fence_concerns_everybody_and_one_that_nobody_puts_up_only_the_guard(
+def test_another_fence_concerns_every_process_and_an_unused_one_the_guard(
     tmp_path: Path,
 ) -> None:
     for mode, concerned in (("strict", {"static", "slam", "guard"}), ("watch", {"guard"})):
@@ -119,7 +137,7 @@ def test_another_fence_concerns_everybody_and_one_that_nobody_puts_up_only_the_g
         assert change(old, tmp_path, new, tmp_path).changed == concerned
 
 
-def test_a_fixed_frame_that_vanished_is_held_by_listeners_and_a_moving_one_is_not(
+def test_listeners_hold_a_vanished_fixed_frame_but_not_a_moving_one(
     tmp_path: Path,
 ) -> None:
     assert changed(tmp_path, replace(PLAN, edges=())).held == ("base → laser",)
@@ -153,7 +171,7 @@ def fixed(child: str, x: float = 0.0) -> PlanEdge:
         ((fixed("mast"), fixed("top")), ("20", "<robot>"), ("", "")),
     ],
 )
-def test_a_stock_state_publisher_is_given_a_description_unless_a_fixed_frame_vanishes(
+def test_a_stock_state_publisher_gets_descriptions_unless_a_frame_vanishes(
     edges: tuple[PlanEdge, ...],
     params: tuple[str, str],
     difference: tuple[str, str],
@@ -163,10 +181,10 @@ def test_a_stock_state_publisher_is_given_a_description_unless_a_fixed_frame_van
     for name, text in (("old", PARAMS % ("20", "<robot>")), ("new", PARAMS % params)):
         (tmp_path / name / "params").mkdir(parents=True)
         (tmp_path / name / "params" / "joints.yaml").write_text(text)
-    found = change(old, tmp_path / "old", replace(old, edges=edges), tmp_path / "new")
+    changes = change(old, tmp_path / "old", replace(old, edges=edges), tmp_path / "new")
     kind, name = difference
-    assert "joints" not in found.changed or kind == "changed"
-    assert (name in found.described, name in found.changed) == (
+    assert "joints" not in changes.changed or kind == "changed"
+    assert (name in changes.described, name in changes.changed) == (
         kind == "described",
         kind == "changed",
     )

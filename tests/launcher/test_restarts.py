@@ -95,7 +95,7 @@ def test_a_gate_that_stays_shut_is_reported_once_and_may_still_open() -> None:
     assert history.started[-1] == "b"
 
 
-def test_a_gate_without_a_time_of_its_own_is_late_after_30_s_and_edges_never_are() -> None:
+def test_a_gate_without_its_own_timeout_is_late_after_30_s_and_edges_never() -> None:
     history = begin(GUARD, gated(), SLAM).feed(Clear()).wait(29.9)
     assert history.late == []
     assert len(history.wait(0.2).late) == 1
@@ -115,7 +115,7 @@ def test_a_line_a_time_and_an_exit_code_open_their_gates() -> None:
     assert history.started[3:] == ["after_time"]
     assert history.feed(LogMatched("line", "up and running")).started[4:] == ["after_line"]
     assert history.feed(Exited("code", 3)).started[5:] == ["after_code"]
-    assert history.found() == []
+    assert history.findings() == []
 
 
 def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
@@ -123,7 +123,7 @@ def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
     expect(history.only(), "TF808", "code", "exit code 0")
 
 
-def test_who_sends_on_tf_is_observed_while_an_edges_gate_is_shut_and_no_longer() -> None:
+def test_tf_senders_are_observed_only_while_an_edges_gate_is_shut() -> None:
     slam = replace(SLAM, ready=Ready("edges", timeout_s=3.0))
     history = begin(GUARD, STATIC, slam).feed(
         Clear(), GateState("slam", "/tf: nobody", is_open=False)
@@ -144,11 +144,11 @@ def test_one_that_was_ready_and_is_done_stays_what_others_wait_for(restart: Rest
     assert history.started[-1] == "both"
 
 
-def test_who_waits_for_one_that_ended_before_it_was_ready_fails_with_the_reason() -> None:
+def test_a_process_fails_with_the_reason_if_its_dependency_ended_unready() -> None:
     history = begin(STATIC, gated(), AFTER).feed(Exited("lidar", 0))
     assert history.started == ["static", "lidar", "b"], "without a guard nobody looks at a topic"
     history = begin(GUARD, STATIC, gated(), AFTER).feed(Clear(), Exited("lidar", 0))
-    expect(history.found()[-1], "TF808", "b", "lidar to be ready", "lidar has ended")
+    expect(history.findings()[-1], "TF808", "b", "lidar to be ready", "lidar has ended")
     assert history.state.stop
 
 
@@ -238,7 +238,7 @@ def test_a_process_is_restarted_and_the_guard_is_informed_before_and_after() -> 
     assert history.started == ["guard", "static", "slam", "slam"]
     assert history.orders[-1] == Present("slam")
     assert history.state.tracked["slam"].restarts == 1
-    assert history.found() == []
+    assert history.findings() == []
 
 
 def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
@@ -247,7 +247,7 @@ def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
     assert (history.states("a")[-1], history.exit_code) == ("stopped", None)
     assert history.started == ["static", "a"]
     assert history.feed(ProcessRequest("start", "a")).started == ["static", "a", "a"]
-    assert history.found() == []
+    assert history.findings() == []
 
 
 def test_a_process_that_ignores_a_request_to_stop_gets_a_firmer_signal() -> None:
@@ -256,7 +256,7 @@ def test_a_process_that_ignores_a_request_to_stop_gets_a_firmer_signal() -> None
     assert history.killed == [("a", SIGINT), ("a", SIGTERM), ("a", SIGKILL)]
 
 
-def test_a_process_that_waits_for_its_restart_can_be_started_at_once_or_stopped() -> None:
+def test_a_process_that_awaits_its_restart_can_be_started_or_stopped() -> None:
     history = begin(STATIC, run_process("a", restart="always")).feed(Exited("a", 1))
     assert history.feed(ProcessRequest("start", "a")).started == ["static", "a", "a"]
     history.feed(Exited("a", 1), ProcessRequest("stop", "a")).wait(60)
@@ -278,7 +278,7 @@ def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: Verb, w
     assert refusal(history.state, "guard", "restart") is None
 
 
-def test_a_guard_that_is_restarted_learns_who_is_absent_and_which_gates_are_shut() -> None:
+def test_a_restarted_guard_learns_absent_owners_and_shut_gates() -> None:
     history = begin(GUARD, STATIC, SLAM, gated()).feed(
         Clear(), ProcessRequest("stop", "slam"), Exited("slam", 0)
     )
@@ -286,7 +286,7 @@ def test_a_guard_that_is_restarted_learns_who_is_absent_and_which_gates_are_shut
     history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
     assert history.started[-1] == "guard"
     assert history.orders == [Absent("slam"), Gate("lidar", topic="/scan")]
-    assert history.found() == []
+    assert history.findings() == []
 
 
 def test_a_guard_that_dies_is_restarted_with_its_reports_and_live_edges() -> None:
@@ -311,9 +311,7 @@ def test_a_guard_that_dies_is_restarted_with_its_reports_and_live_edges() -> Non
 @pytest.mark.parametrize(
     ("mode", "did"), [("watch", "watched nothing"), ("strict", "forwarded nothing")]
 )
-def test_a_guard_that_hangs_is_reported_and_ended_and_its_end_is_that_of_one_that_dies(
-    mode: str, did: str
-) -> None:
+def test_a_hanging_guard_is_reported_and_ends_like_one_that_dies(mode: str, did: str) -> None:
     history = begin(GUARD, STATIC, guard=GuardPolicy(mode)).feed(Clear(), Alive())  # type: ignore[arg-type]
     history.wait(9).feed(Alive())
     assert (history.sleep_until_due(), history.killed) == (
@@ -334,10 +332,10 @@ def test_a_guard_that_is_heard_again_before_it_is_believed_to_hang_goes_on() -> 
     for _ in range(3):
         history.wait(3600)  # the launcher, or the whole machine, stood still
         history.wait(1).feed(Alive())
-    assert (history.killed, history.found()) == ([], [])
+    assert (history.killed, history.findings()) == ([], [])
 
 
-def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_again() -> None:
+def test_silent_edges_do_not_count_as_live_until_they_are_heard_again() -> None:
     def counted() -> tuple[bool, tuple[str, ...], int]:
         answer = status(history.state, history.now)
         return answer.complete, answer.silent, answer.processes[1].live
@@ -382,15 +380,15 @@ def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
     for _ in range(5):
         history.feed(Exited("guard", 1)).sleep_until_due()
     history.feed(Exited("guard", 1))
-    expect(history.found()[-1], "TF808", "guard", "exit code 1", " 5 restarts")
-    assert [finding.severity for finding in history.found()] == ["warning"] * 5 + ["error"]
+    expect(history.findings()[-1], "TF808", "guard", "exit code 1", " 5 restarts")
+    assert [finding.severity for finding in history.findings()] == ["warning"] * 5 + ["error"]
     assert history.feed(Exited("static", 0)).exit_code == 1
 
 
-def test_a_guard_that_is_requested_anew_or_follows_another_plan_begins_without_memory() -> None:
+def test_a_guard_restarted_on_request_or_for_a_plan_has_no_memory() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("static", ("laser",)))
     history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
-    assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])
+    assert (history.state.memory, history.state.live, history.findings()) == ({}, frozenset(), [])
     history.feed(Clear(), Remember({"a": 1}), Exited("guard", 1))
     history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"})))
     assert (history.state.memory, history.state.live, history.started[-1]) == (
@@ -403,7 +401,7 @@ def test_a_guard_that_is_requested_anew_or_follows_another_plan_begins_without_m
 # Other plans.
 
 
-def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is_gone() -> None:
+def test_another_plan_restarts_changed_starts_new_and_stops_removed_ones() -> None:
     a, b, new = run_process("a"), run_process("b"), run_process("new")
     history = begin(STATIC, a, b)
     plan: Plan = plan_of(STATIC, replace(a, argv=("other",)), new)
@@ -414,7 +412,7 @@ def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is
     assert history.started[3:] == ["new", "a"]
     assert list(history.state.tracked) == ["static", "a", "new"]
     assert history.all(Replanned) == [Replanned(("a",), ("new",), ("b",), ("base_link → x",))]
-    assert history.found() == []
+    assert history.findings() == []
 
 
 def test_a_guard_that_goes_on_reads_another_plan() -> None:
@@ -423,6 +421,19 @@ def test_a_guard_that_goes_on_reads_another_plan() -> None:
     assert Reread("new.json") in history.orders
     history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"}), file="newer.json"))
     assert Reread("newer.json") not in history.orders, "the next one reads it itself"
+
+
+@pytest.mark.parametrize("runs", [True, False])
+def test_a_running_follower_reads_the_plan_after_the_guard(runs: bool) -> None:  # noqa: FBT001
+    history = begin(GUARD, STATIC).feed(Clear())
+    if not runs:
+        history.feed(ProcessRequest("stop", "static"), Exited("static", 0))
+    before = list(history.killed)
+    followers = frozenset({"static"})
+    history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset(), file="b.json", followers=followers))
+    assert Reread("b.json") in history.orders
+    assert history.followed == ([("static", "b.json", len(history.orders))] if runs else [])
+    assert history.killed == before
 
 
 DESCRIBED = replace(run_process("rsp"), params_file="params/rsp.yaml", nodes=("/rsp",))
@@ -436,7 +447,7 @@ def given_a_description(*, guard: bool = True) -> History:
     return history.feed(NewPlan(plan, frozenset(), (), "b/plan.json", frozenset({"rsp"})))
 
 
-def test_the_guard_gives_a_process_its_new_description_and_nothing_is_restarted() -> None:
+def test_the_guard_gives_a_process_a_new_description_and_nothing_restarts() -> None:
     history = given_a_description()
     assert GIVEN in history.orders
     history.feed(DescriptionState("rsp"))
@@ -447,7 +458,7 @@ def test_the_guard_gives_a_process_its_new_description_and_nothing_is_restarted(
 def test_a_process_that_refuses_its_description_is_started_anew() -> None:
     history = given_a_description().feed(DescriptionState("rsp", "not a URDF"))
     assert history.killed == [("rsp", SIGINT)]
-    assert history.state.tracked["rsp"].wanted, "nothing is ready without it"
+    assert history.state.tracked["rsp"].should_run, "nothing is ready without it"
     assert history.feed(Exited("rsp", 0)).started[-1] == "rsp"
     assert history.all(Replanned)[-1] == Replanned(("rsp",))
     before = list(history.killed)

@@ -126,14 +126,14 @@ def test_a_folder_that_another_user_can_open_is_not_used(
 
 
 def test_another_plan_is_kept_from_then_on(files: RunFiles, rover_dir: RuntimeDir) -> None:
-    other = rover_dir.plan_folder("2") / "plan.json"
-    other.parent.mkdir()
-    other.write_bytes(b"another plan")
-    files.keep(other)
+    second_plan = rover_dir.plan_folder("2") / "plan.json"
+    second_plan.parent.mkdir()
+    second_plan.write_bytes(b"another plan")
+    files.keep(second_plan)
     shutil.rmtree(rover_dir.folder)
     assert restored(files)
-    assert other.read_bytes() == b"another plan"
-    assert rover_dir.plan_folders() == [other.parent]
+    assert second_plan.read_bytes() == b"another plan"
+    assert rover_dir.plan_folders() == [second_plan.parent]
 
 
 @pytest.mark.parametrize(
@@ -199,8 +199,8 @@ def test_a_robot_whose_folder_was_removed_is_found_steered_and_repaired(tmp_path
             return None
         return process.pid if process.state == "running" else None
 
-    def is_another(known: set[int | None]) -> bool:
-        return pid_of_reader() not in known
+    def is_another(earlier_pids: set[int | None]) -> bool:
+        return pid_of_reader() not in earlier_pids
 
     try:
         assert until(partial(is_another, {None}))
@@ -209,8 +209,8 @@ def test_a_robot_whose_folder_was_removed_is_found_steered_and_repaired(tmp_path
             assert before
             shutil.rmtree(tmp_path / "user")
             os.kill(before, signal.SIGKILL)
-            known = {None, before}
-            assert until(partial(is_another, known))
+            pids_before = {None, before}
+            assert until(partial(is_another, pids_before))
             assert ask(runtime_dir, StatusRequest(), RobotStatus).processes[0].restarts <= 2
         shutil.rmtree(tmp_path / "user")
         assert until(partial(is_another, {None})), "without the start of a process, too"

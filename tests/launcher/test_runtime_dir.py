@@ -47,7 +47,7 @@ def env(tmp_path: Path) -> dict[str, str]:
     }
 
 
-def test_a_robot_is_its_name_in_its_domain_which_is_the_plans_or_else_the_environments(
+def test_a_robot_is_its_name_in_the_domain_of_its_plan_or_environment(
     env: dict[str, str],
 ) -> None:
     runtime_dir = runtime_dir_of(ROVER, env)
@@ -114,16 +114,16 @@ def test_one_of_two_gets_the_lock_and_a_killed_holder_leaves_nothing(
 ) -> None:
     runtime_dir = runtime_dir_of(ROVER, env)
     command = [sys.executable, "-c", HOLD, str(runtime_dir.folder)]
-    with processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
-        assert other.stdout
-        run = other.stdout.readline().strip()
+    with processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as holding:
+        assert holding.stdout
+        run = holding.stdout.readline().strip()
         with pytest.raises(BlockingIOError):
             Lock(runtime_dir)
         holder = runtime_dir.holder()
         assert holder
-        assert (holder.pid, holder.run) == (other.pid, run)
+        assert (holder.pid, holder.run) == (holding.pid, run)
         assert [listed.name for listed in runtime_dirs(env)] == ["rover@7"]
-        other.kill()
+        holding.kill()
     assert runtime_dir.holder() is None
     lock = Lock(runtime_dir)
     assert lock.run != run

@@ -71,7 +71,7 @@ def test_under_nohup_a_hang_up_stays_ignored() -> None:
         assert not stop.wait(0.05)
 
 
-def test_a_signal_that_was_blocked_until_then_counts_and_is_blocked_again_afterwards() -> None:
+def test_a_blocked_signal_counts_and_is_blocked_again_afterwards() -> None:
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         signal.pthread_kill(

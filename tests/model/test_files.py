@@ -22,9 +22,9 @@ def address(filename: str) -> str:
         f" filename={quoteattr(filename)}/></robot>"
     )
     urdf = urdf.replace('name="mesh filename="/', 'name="../a"/')
-    found = ET.fromstring(with_absolute_addresses(urdf, FOLDER))  # noqa: S314 (ours)
-    assert [link.get("name") for link in found.iter("link")] == ["../a"]
-    return str(next(found.iter("mesh")).get("filename"))
+    root = ET.fromstring(with_absolute_addresses(urdf, FOLDER))  # noqa: S314 (ours)
+    assert [link.get("name") for link in root.iter("link")] == ["../a"]
+    return str(next(root.iter("mesh")).get("filename"))
 
 
 def test_a_relative_path_becomes_the_file_that_it_means() -> None:

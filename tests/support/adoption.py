@@ -30,14 +30,14 @@ def hand_over_first(folder: Path, robot: str, *launch: str) -> str:
     Without a launch file, ending its publisher is up to the caller.
     """
     lines = status_of(folder, robot, *launch)
-    end = next((at for at, line in enumerate(lines[1:], 1) if line[0] != " "), len(lines))
+    end = next((index for index, line in enumerate(lines[1:], 1) if line[0] != " "), len(lines))
     texts = {name: (folder / name).read_text("utf-8").split("\n") for name in (robot, *launch)}
     for line in lines[1:end]:
         if line.startswith(_UNKNOWN) and not launch:
             continue
-        found = _EDIT.fullmatch(line)
-        assert found, line
-        do, file, first, last, text = found.groups()
+        match = _EDIT.fullmatch(line)
+        assert match, line
+        do, file, first, last, text = match.groups()
         count = int(last or first) - int(first)
         lines_of_file = [f"  {text}" if do == "write" else "", *[""] * count]
         texts[Path(file).name][int(first) - 1 : int(first) + count] = lines_of_file

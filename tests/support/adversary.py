@@ -188,11 +188,11 @@ class PlainListener:
 
     def until(self, child: str, x: float, times: int = 20) -> list[float]:
         """Listen until this x came so often for the frame, and return all that came for it."""
-        with open_node("late", "/test") as own:
-            reader = TFSubscription(own, static=False)
+        with open_node("late", "/test") as node:
+            reader = TFSubscription(node, static=False)
 
             def enough() -> bool:
-                wait(own, [reader], 0.1, Stop())
+                wait(node, [reader], 0.1, Stop())
                 for received in reader.take():
                     for transform in decode(received.data):
                         self.heard.setdefault(transform.child, []).append(transform.xyz[0])

@@ -99,13 +99,13 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
             if process.package
             else process.launch or process.argv[0]
         )
-        own = process.package or process.launch
+        is_ros_process = process.package or process.launch
         same = sum(bringup["program"] == program for bringup in programs.values())
         programs[f"{program} {same}" if process.launch else process.name] = {
             "program": program,
             "words": [
                 _PARAMETER_FILE.sub("${params_file}", word)
-                for word in (process.argv if own else process.argv[1:])
+                for word in (process.argv if is_ros_process else process.argv[1:])
             ],
             "namespace": (
                 process.ros_nodes[0].name.rpartition("/")[0].strip("/") if process.package else ""

@@ -126,7 +126,16 @@ def _compile(folder: Path) -> None:
         )
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
     library = package / f"{NAME}_s__rosidl_typesupport_c{suffix}"
-    at = f"{sys.prefix}/lib"
+    lib_folder = f"{sys.prefix}/lib"
     names = [f"-l{name}" for name in _LIBRARIES]
-    link = ["g++", "-shared", *objects, "-o", str(library), f"-L{at}", f"-Wl,-rpath,{at}", *names]
+    link = [
+        "g++",
+        "-shared",
+        *objects,
+        "-o",
+        str(library),
+        f"-L{lib_folder}",
+        f"-Wl,-rpath,{lib_folder}",
+        *names,
+    ]
     subprocess.run(link, check=True, capture_output=True)

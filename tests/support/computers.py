@@ -170,9 +170,10 @@ class Computers:
             for number, name in enumerate(self.names):
                 self.computers[name] = Computer(name, f"10.77.0.{number + 2}", self.folder / name)
                 self.boot(name)
-            known = (self.folder / "host_key.pub").read_text()
+            host_key = (self.folder / "host_key.pub").read_text()
             lines = [
-                f"[{computer.address}]:{self.port} {known}" for computer in self.computers.values()
+                f"[{computer.address}]:{self.port} {host_key}"
+                for computer in self.computers.values()
             ]
             (self.home / ".ssh/known_hosts").write_text("".join(lines))
         except BaseException:

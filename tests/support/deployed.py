@@ -109,8 +109,8 @@ def rollout_to(
     for host in hosts:
         probe = PROBE | (probes or {}).get(host.name, {})
         unit = Unit(f"rover.{host.name}", "rover", host.name, probe["base"], probe["executable"])
-        there: ConnectedHost = host  # type: ignore[assignment]
-        shares.append(Share(there, unit, probe))
+        connected_host: ConnectedHost = host  # type: ignore[assignment]
+        shares.append(Share(connected_host, unit, probe))
     return Rollout(target, shares, lambda _: None)
 
 

@@ -31,17 +31,19 @@ def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]
     return done.returncode, json.loads(done.stdout)
 
 
-def doctor_finds(expected: Mapping[str, Sequence[str]], others: set[str]) -> list[dict[str, Any]]:
-    """Run it until it finds these codes with these names, and no others but ``others``.
+def doctor_finds(
+    expected: Mapping[str, Sequence[str]], tolerated: set[str]
+) -> list[dict[str, Any]]:
+    """Run it until it finds these codes with these names, and no others but the tolerated.
 
     A few times.
     """
     for seconds in OBSERVE_S:  # names may come late
-        exit_code, found = doctor(seconds=seconds)
-        if finds(found, expected, others):
+        exit_code, findings = doctor(seconds=seconds)
+        if finds(findings, expected, tolerated):
             break
     assert exit_code == 1
-    return found
+    return findings
 
 
 def finds_nothing(*words: str) -> bool:
@@ -58,20 +60,20 @@ def at_last(claim: Callable[[float], None]) -> None:
 
 
 def finds(
-    found: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], others: set[str]
+    findings: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], tolerated: set[str]
 ) -> bool:
-    """Return whether these codes were found, with their names, and none but ``others``."""
-    codes = {entry["code"] for entry in found}
+    """Return whether these codes were found, with their names, and none but the tolerated."""
+    codes = {entry["code"] for entry in findings}
     named = (
-        name in messages_of(found, code) for code, names in expected.items() for name in names
+        name in messages_of(findings, code) for code, names in expected.items() for name in names
     )
-    return codes >= expected.keys() and codes <= {*expected, *others} and all(named)
+    return codes >= expected.keys() and codes <= {*expected, *tolerated} and all(named)
 
 
-def messages_of(found: list[dict[str, Any]], code: str) -> str:
+def messages_of(findings: list[dict[str, Any]], code: str) -> str:
     """Return all that was said of that code."""
-    assert code in {entry["code"] for entry in found}, found
-    parts = [entry for entry in found if entry["code"] == code]
+    assert code in {entry["code"] for entry in findings}, findings
+    parts = [entry for entry in findings if entry["code"] == code]
     return "\n".join(
         "\n".join([part["message"], *(note["message"] for note in part["notes"]), part["help"]])
         for part in parts

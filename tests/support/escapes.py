@@ -230,7 +230,7 @@ def _relative(t: Try) -> None:
     open(os.path.basename(t.secret)).close()
 
 
-def _at(t: Try) -> None:
+def _by_descriptor(t: Try) -> None:
     folder = os.open(t.tree, os.O_RDONLY)
     _open(f"/proc/self/fd/{folder}/../{os.path.basename(t.secret)}")
 
@@ -308,7 +308,7 @@ def _by_python(t: Try) -> dict[str, Callable[[], Any]]:
         "the same through a link in the tree": lambda: _open(t.path("link")),
         "the same after chdir": lambda: _relative(t),
         "the same from a folder's descriptor": lambda: _below(t),
-        "the same through /proc/self/fd": lambda: _at(t),
+        "the same through /proc/self/fd": lambda: _by_descriptor(t),
         "the same through O_PATH": lambda: _reopened(t),
         "the same in a thread": lambda: _thread(lambda: _open(t.secret)),
         "the same by mmap": lambda: mmap.mmap(
@@ -486,14 +486,14 @@ def _checked(result: int) -> int:
 
 def _by_machine_code(t: Try) -> dict[str, Callable[[], Any]]:
     path = ctypes.create_string_buffer(t.path("kept").encode())
-    at = ctypes.addressof(path)
+    address = ctypes.addressof(path)
     tries: dict[str, Callable[[], Any]] = {}
     calls = {
-        "open for writing": (2, at, os.O_RDWR),
+        "open for writing": (2, address, os.O_RDWR),
         "socket": (41, 2, 1, 0),
         "kill": (62, t.victim, 0),
         "x32's getpid": (0x40000000 | 39,),
-        "x32's open": (0x40000000 | 2, at, os.O_RDWR),
+        "x32's open": (0x40000000 | 2, address, os.O_RDWR),
     }
     for function in ("direct", "written"):
         for name, arguments in calls.items():
@@ -501,9 +501,9 @@ def _by_machine_code(t: Try) -> dict[str, Callable[[], Any]]:
             tries[f"{function}: {name}"] = functools.partial(t.machine, function, *padded)
     return tries | {
         "32-bit getpid": lambda: t.machine("of_32_bit", 20, 0, 0, 0),
-        "32-bit open": lambda: t.machine("of_32_bit", 5, at, os.O_RDWR, 0),
+        "32-bit open": lambda: t.machine("of_32_bit", 5, address, os.O_RDWR, 0),
         "32-bit kill": lambda: t.machine("of_32_bit", 37, t.victim, 0, 0),
-        "32-bit socketcall": lambda: t.machine("of_32_bit", 102, 1, at, 0),
+        "32-bit socketcall": lambda: t.machine("of_32_bit", 102, 1, address, 0),
         "32-bit fork": lambda: _quit_in_child(t.machine("of_32_bit", 2, 0, 0, 0)),
     }
 

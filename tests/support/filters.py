@@ -12,11 +12,11 @@ def verdict(program: bytes, architecture: int, number: int, arguments: Sequence[
     data = struct.pack(
         "<IIQ6Q", number, architecture, 0, *(text & (1 << 64) - 1 for text in padded)
     )
-    lines = [struct.unpack_from("HBBI", program, at) for at in range(0, len(program), 8)]
-    at = value = 0
+    lines = [struct.unpack_from("HBBI", program, offset) for offset in range(0, len(program), 8)]
+    index = value = 0
     while True:
-        code, then, otherwise, operand = lines[at]
-        at += 1
+        code, then, otherwise, operand = lines[index]
+        index += 1
         if code == 0x20:
             value = int(struct.unpack_from("<I", data, operand)[0])
         elif code == 0x06:
@@ -27,4 +27,4 @@ def verdict(program: bytes, architecture: int, number: int, arguments: Sequence[
                 0x35: value >= operand,
                 0x45: bool(value & operand & _WORD),
             }[code]
-            at += then if holds else otherwise
+            index += then if holds else otherwise

@@ -106,7 +106,7 @@ def main(x: float, *edges: str) -> None:
         pose = Transform(Vector3(x, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
         pairs = [edge.split() for edge in edges]
         transforms: Any = [
-            TransformStamped(Header(stamp, parent), other, pose) for parent, other in pairs
+            TransformStamped(Header(stamp, parent), child, pose) for parent, child in pairs
         ]
         writer.write(TFMessage(transforms))
         time.sleep(0.05)

@@ -37,6 +37,7 @@ from tfcompose.spec.load.params import load_params
 from tfcompose.tf.ros.tf_codec import Decoder, decode
 from tfcompose.tools.exporters.kubernetes import Cluster, files_of, kubernetes
 from tfcompose.tools.exporters.launch import launch
+from tfcompose.tools.exporters.launch_frontends import LaunchFile
 from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus"
@@ -91,32 +92,32 @@ PIECES = [word.encode() for word in WORDS.split()] + [
 ]
 
 
-def mutated(data: bytes, others: list[bytes], rng: random.Random) -> bytes:
+def mutated(data: bytes, samples: list[bytes], rng: random.Random) -> bytes:
     """Return the data with pieces replaced, removed, doubled, or taken from other inputs."""
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
-        at = rng.randrange(len(data) + 1)
-        end = min(len(data), at + rng.choice((0, 0, 1, 2, 4, 8, 40)))
+        begin_at = rng.randrange(len(data) + 1)
+        end = min(len(data), begin_at + rng.choice((0, 0, 1, 2, 4, 8, 40)))
         kind = rng.randrange(6)
         if kind == 0:
             piece = rng.choice(PIECES)
         elif kind == 1:
             piece = bytes([rng.randrange(256)])
-        elif kind == 2 and end > at:
-            piece = bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 : end]
+        elif kind == 2 and end > begin_at:
+            piece = bytes([data[begin_at] ^ 1 << rng.randrange(8)]) + data[begin_at + 1 : end]
         elif kind == 3:
-            other = rng.choice(others)
-            begin = rng.randrange(len(other) + 1)
-            piece = other[begin : begin + rng.randrange(80)]
+            sample = rng.choice(samples)
+            begin = rng.randrange(len(sample) + 1)
+            piece = sample[begin : begin + rng.randrange(80)]
         elif kind == 4:
             begin = rng.randrange(len(data) + 1)
             piece = data[begin : begin + rng.randrange(80)] * rng.choice((1, 1, 2, 20))
         else:
             piece = b""
-        data = data[:at] + piece + data[end:]
+        data = data[:begin_at] + piece + data[end:]
     return data[:LONGEST]
 
 
-def _shown(findings: list[Finding]) -> None:
+def _render_all(findings: list[Finding]) -> None:
     """Render findings in each form; each says where and what in text that a terminal can take."""
     assert not [finding for finding in findings if finding.code == "TF903"], findings
     for text in (
@@ -134,9 +135,9 @@ def _compiled(file: Path) -> None:
         text = read_text(str(file))
         compiled = compile_robot(text, str(file), LIBRARY, read=read_text, disk=disk())
     except RejectedError as error:
-        _shown(list(error.findings))
+        _render_all(list(error.findings))
         return
-    _shown(list(compiled.findings))
+    _render_all(list(compiled.findings))
     assert compiled.robot or compiled.errors
     if compiled.robot and not compiled.errors:
         for emitted in emit(compiled.robot):
@@ -168,23 +169,23 @@ def params(data: bytes, folder: Path) -> None:
     file = folder / "nav.yaml"
     file.write_bytes(data)
     try:
-        _shown(load_params(read_text(str(file)), str(file)).findings)
+        _render_all(load_params(read_text(str(file)), str(file)).findings)
     except RejectedError as error:
-        _shown(list(error.findings))
+        _render_all(list(error.findings))
 
 
 def urdf(data: bytes, folder: Path) -> None:
     """A URDF, which names no xacro."""
     file = folder / "r.urdf"
     file.write_bytes(data.replace(b"<xacro:", b"<xacro_"))
-    _shown(lint_urdf(str(file), Packages(disk())))
+    _render_all(lint_urdf(str(file), Packages(disk())))
 
 
 def xacro(data: bytes, folder: Path) -> None:
     """A xacro file."""
     file = folder / "r.xacro"
     file.write_bytes(data)
-    _shown(lint_urdf(str(file), Packages(disk())))
+    _render_all(lint_urdf(str(file), Packages(disk())))
 
 
 def _run(argv: list[str], folder: Path) -> None:
@@ -226,7 +227,7 @@ def plan(data: bytes, folder: Path) -> None:
             str(folder / "plan.json"),
         )
     except RejectedError as error:
-        _shown(list(error.findings))
+        _render_all(list(error.findings))
         return
     except UnicodeDecodeError:
         return
@@ -236,7 +237,7 @@ def plan(data: bytes, folder: Path) -> None:
     texts = {path: "" for process in read.started for path in files_of(read, process)}
     pods = kubernetes(read, Cluster("robot:1"), texts)
     units, services = systemd(read, Machine("/robot")), compose(read, Machine("."))
-    for made, _ in (units, services, launch(read, Machine("."), "<robot/>"), pods):
+    for made, _ in (units, services, launch(read, LaunchFile("."), "<robot/>"), pods):
         for file in made:
             file.text.encode()
 
@@ -339,17 +340,17 @@ def main(count: int, seed: int) -> int:
     failures = 0
     with tempfile.TemporaryDirectory() as folder:
         for kind in KINDS:
-            tried, found = 0, set[tuple[str, ...]]()
+            tried, faults = 0, set[tuple[str, ...]]()
             for data in inputs(kind, seed, int(count * kind.weight)):
                 fault, tried = fault_of(kind, data, Path(folder)), tried + 1
                 where = tuple(fault.splitlines()[-3:])
-                if fault and where not in found:
-                    found.add(where)
+                if fault and where not in faults:
+                    faults.add(where)
                     sys.stderr.write(f"{_kept(kind, data)}\n{fault}\n")
-            failures += len(found)
+            failures += len(faults)
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
             sys.stdout.write(
-                f"{kind.name}: {tried} inputs, {len(found)} faults; peak memory {peak} MB\n"
+                f"{kind.name}: {tried} inputs, {len(faults)} faults; peak memory {peak} MB\n"
             )
             sys.stdout.flush()
     return failures

@@ -11,11 +11,11 @@ from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
 from tfcompose.model.messages import (
     Clear,
+    EdgeTaken,
+    FilterBypassed,
     FindingShown,
     GuardEvent,
     RecoveredShown,
-    Taken,
-    Unfenced,
 )
 from tfcompose.model.plan import (
     GuardPolicy,
@@ -101,7 +101,7 @@ class History:
     clock: Clock = "wall"
     settle_s: float = SETTLE_S
     gids: bool = True
-    says_who: bool = True
+    gid_identifies_node: bool = True
     edges: tuple[PlanEdge, ...] = EDGES
     claims: tuple[PlanClaim, ...] = ()
     now: float = 1000.0
@@ -125,7 +125,13 @@ class History:
             self.guard,
             claims=self.claims,
         )
-        self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns(), says_who=self.says_who)
+        self.judge = Judge(
+            plan,
+            self.settle_s,
+            self.now,
+            self.wall_ns(),
+            gid_identifies_node=self.gid_identifies_node,
+        )
         self.ticked = self.now
 
     def wall_ns(self) -> int:
@@ -174,7 +180,7 @@ class History:
         pairs = tuple((names.split()[0], names.split()[1]) for names in edges.split(", "))
         kind = publisher.static if static is None else static
         gid = (
-            (publisher.gid if self.says_who else publisher.gid[:8] + bytes(8))
+            (publisher.gid if self.gid_identifies_node else publisher.gid[:8] + bytes(8))
             if self.gids
             else None
         )
@@ -234,17 +240,19 @@ class History:
         self.events = self.judge.recall(memory, self.now)
         return self
 
-    def found(self) -> list[Finding]:
+    def findings(self) -> list[Finding]:
         return self.findings_in(self.events)
 
     @staticmethod
     def findings_in(events: Sequence[GuardEvent]) -> list[Finding]:
         return [
-            event.found for event in events if isinstance(event, (FindingShown, Taken, Unfenced))
+            event.found
+            for event in events
+            if isinstance(event, (FindingShown, EdgeTaken, FilterBypassed))
         ]
 
     def reports(self) -> list[str]:
-        return [f"{finding.code} {finding.message}" for finding in self.found()]
+        return [f"{finding.code} {finding.message}" for finding in self.findings()]
 
     def over(self) -> list[str]:
         """Return what is said to have ended."""
@@ -252,7 +260,7 @@ class History:
 
     def only(self) -> Finding:
         """Return what was found, which is one thing."""
-        (finding,) = self.found()
+        (finding,) = self.findings()
         return finding
 
     def all(self, kind: type[GuardEvent]) -> list[GuardEvent]:

@@ -13,7 +13,7 @@ if "guard" in sys.orig_argv:
     import dataclasses
     import tfcompose.tf.ros.graph as graph
     gid_of = graph.gid_of
-    graph.ids_say_who = lambda node: False
+    graph.gid_identifies_node = lambda node: False
     graph.gid_of = lambda publisher: gid_of(publisher)[::-1]
     import tfcompose.tf.ros.node as node
     receive = node.Subscription._receive

@@ -78,26 +78,28 @@ def imports_of(file: Path, *, for_types: bool = True) -> frozenset[str]:
 
 def imports() -> dict[str, set[str]]:
     """Return, for each wing, the other wings that it imports."""
-    found: dict[str, set[str]] = {}
+    graph: dict[str, set[str]] = {}
     for file in sorted(PACKAGE.rglob("*.py")):
         part = part_of(file)
         if part in {"__init__", "__main__"}:
             continue
-        others = {name.split(".")[1] for name in imports_of(file) if name.startswith("tfcompose.")}
-        found.setdefault(part, set()).update(others - {part})
-    return found
+        imported = {
+            name.split(".")[1] for name in imports_of(file) if name.startswith("tfcompose.")
+        }
+        graph.setdefault(part, set()).update(imported - {part})
+    return graph
 
 
 def reachable(graph: dict[str, set[str]], part: str) -> set[str]:
     """Return what a part imports, directly or through others."""
-    found: set[str] = set()
+    visited: set[str] = set()
     waiting = list(graph[part])
     while waiting:
-        other = waiting.pop()
-        if other not in found:
-            found.add(other)
-            waiting.extend(graph[other])
-    return found
+        imported = waiting.pop()
+        if imported not in visited:
+            visited.add(imported)
+            waiting.extend(graph[imported])
+    return visited
 
 
 def reduced(graph: dict[str, set[str]]) -> dict[str, set[str]]:
@@ -107,20 +109,16 @@ def reduced(graph: dict[str, set[str]]) -> dict[str, set[str]]:
     """
     below = {part: reachable(graph, part) for part in graph}
     return {
-        part: {
-            other_process
-            for other_process in others
-            if not any(other_process in below[via] for via in others)
-        }
-        for part, others in graph.items()
+        part: {target for target in imported if not any(target in below[via] for via in imported)}
+        for part, imported in graph.items()
     }
 
 
 def mermaid() -> str:
     """Return the drawing, as lines of Mermaid: an arrow leads from a part to what it imports."""
     lines = ["flowchart TD"]
-    for wing, others in sorted(reduced(imports()).items()):
-        lines += [f"  {wing} --> {other}" for other in sorted(others)] or [f"  {wing}"]
+    for wing, imported in sorted(reduced(imports()).items()):
+        lines += [f"  {wing} --> {target}" for target in sorted(imported)] or [f"  {wing}"]
     return "".join(f"{line}\n" for line in lines)
 
 

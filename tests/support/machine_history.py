@@ -11,6 +11,7 @@ from tfcompose.launcher.events import (
     Begin,
     Event,
     Finish,
+    Follow,
     Kill,
     Notify,
     NotifyLate,
@@ -83,6 +84,8 @@ class History:
     orders: list[GuardOrder] = field(default_factory=list)
     requested: list[ComponentOrder] = field(default_factory=list)
     late: list[Finding] = field(default_factory=list)
+    #: Processes that were to read a plan again, its file, and how many orders were before.
+    followed: list[tuple[str, str, int]] = field(default_factory=list)
     exit_code: int | None = None
     starts: bool = True
     state: State = field(init=False)
@@ -111,6 +114,8 @@ class History:
                 self.requested.append(order)
             case Order(order):
                 self.orders.append(order)
+            case Follow(name, file):
+                self.followed.append((name, file, len(self.orders)))
             case NotifyLate(_, finding):
                 self.late.append(finding)
             case Finish(code):
@@ -147,12 +152,12 @@ class History:
     def all(self, kind: type[N]) -> list[N]:
         return [notice for notice in self.notices if isinstance(notice, kind)]
 
-    def found(self) -> list[Finding]:
+    def findings(self) -> list[Finding]:
         return [notice.found for notice in self.all(FindingShown)]
 
     def only(self) -> Finding:
         """Return what was shown, which is one finding."""
-        (finding,) = self.found()
+        (finding,) = self.findings()
         return finding
 
     def states(self, name: str) -> list[str]:

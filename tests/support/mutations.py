@@ -84,9 +84,9 @@ def mutated(text: str, seed: str) -> str:
 def _other_word(text: str, chooser: Chooser) -> str:
     """Change a word of a text that is no tree: rows of numbers, a launch file."""
     words = re.split(r"(\s+)", text)
-    at = 2 * chooser.below((len(words) + 1) // 2)
-    words[at] = chooser.pick(
-        (chooser.pick(VALUES), _slip(words[at], chooser), "", f"{words[at]} {words[at]}")
+    index = 2 * chooser.below((len(words) + 1) // 2)
+    words[index] = chooser.pick(
+        (chooser.pick(VALUES), _slip(words[index], chooser), "", f"{words[index]} {words[index]}")
     )
     return "".join(words)
 
@@ -183,17 +183,17 @@ def _duplicate(text: str, spot: Spot, _: Chooser) -> str:
 def _slip(word: str, chooser: Chooser) -> str:
     if not word:
         return "x"
-    at = chooser.below(len(word))
+    index = chooser.below(len(word))
     kind = chooser.below(5)
     if kind == 0:
-        return word[:at] + word[at + 1 :]
+        return word[:index] + word[index + 1 :]
     if kind == 1:
-        return word[:at] + word[at] + word[at:]
+        return word[:index] + word[index] + word[index:]
     if kind == 2:
-        return word[:at] + word[at : at + 2][::-1] + word[at + 2 :]
+        return word[:index] + word[index : index + 2][::-1] + word[index + 2 :]
     if kind == 3:
-        return word[:at] + word[at].swapcase() + word[at + 1 :]
-    return word[:at] + chooser.pick("abeinorst_") + word[at + 1 :]
+        return word[:index] + word[index].swapcase() + word[index + 1 :]
+    return word[:index] + chooser.pick("abeinorst_") + word[index + 1 :]
 
 
 def _rename(text: str, spot: Spot, chooser: Chooser) -> str:

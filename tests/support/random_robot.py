@@ -28,15 +28,15 @@ def spec(seed: int, types: tuple[str, ...] = TYPES, links: int = 14) -> dict[str
     for index in range(links):
         # the first ones cover every type; what follows is chance
         kind = types[index] if index < len(types) else chance.choice((*types, "frame", "link"))
-        name, at = f"{kind}_{index}", _pose(chance) | {"parent": chance.choice(names)}
+        name, placement = f"{kind}_{index}", _pose(chance) | {"parent": chance.choice(names)}
         if kind == "frame":
-            robot["frames"][name] = at
+            robot["frames"][name] = placement
         elif kind == "link":
-            robot["links"][name] = at | _body(chance)
+            robot["links"][name] = placement | _body(chance)
         else:
             robot["links"][name] = _body(chance)
             joint = robot["joints"][f"joint_{index}"] = (
-                at | {"child": name} | _joint(chance, kind, masters)
+                placement | {"child": name} | _joint(chance, kind, masters)
             )
             masters += [f"joint_{index}"] if kind in MOVING and "mimic" not in joint else []
         names.append(name)
@@ -56,6 +56,7 @@ def _joint(chance: random.Random, kind: str, masters: list[str]) -> dict[str, An
         return joint | {"owner": "mover"} | ({"axis": [0, 0, 1]} if kind == "planar" else {})
     joint["axis"] = [round(chance.uniform(0.1, 1), 3) * chance.choice((1, -1)) for _ in range(3)]
     joint |= {} if kind == "continuous" else {"limit": LIMIT}
+    joint["offset"] = round(joint["axis"][0] / 4, 4)
     if chance.random() < 0.5:
         joint["dynamics"] = {
             "damping": round(chance.random(), 3),

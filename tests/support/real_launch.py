@@ -5,6 +5,7 @@ their files, as JSON.
 """
 
 import json
+import os
 import sys
 from array import array
 from itertools import pairwise
@@ -21,6 +22,18 @@ from launch_ros.substitutions.executable_in_package import ExecutableInPackage
 from rclpy.parameter import parameter_value_to_python
 
 STARTED: list[dict[str, Any]] = []
+BEFORE = dict(os.environ)
+#: Settings of launch's processes, which it keeps for itself.
+SUPERVISION = (
+    "emulate_tty",
+    "on_exit",
+    "output",
+    "respawn",
+    "respawn_delay",
+    "respawn_max_retries",
+    "sigkill_timeout",
+    "sigterm_timeout",
+)
 
 
 def record(action: Any, context: Any) -> None:
@@ -31,7 +44,29 @@ def record(action: Any, context: Any) -> None:
         Path(file).read_text("utf-8") for word, file in pairwise(words) if word == "--params-file"
     ]
     params = [yaml.unsafe_load(text) for text in files]
-    STARTED.append({"words": words, "params": params, "texts": files})
+    STARTED.append(
+        {
+            "words": words,
+            "params": params,
+            "texts": files,
+            "cwd": action.process_description.final_cwd,
+            "env": dict(set(action.process_description.final_env.items()) - set(BEFORE.items())),
+            "supervision": {
+                name: text_of(getattr(action, f"_ExecuteLocal__{name}"), context)
+                for name in SUPERVISION
+            },
+        }
+    )
+
+
+def text_of(value: Any, context: Any) -> Any:
+    """Return a setting with its substitutions performed, and the kinds of the actions in it."""
+    value = [value] if hasattr(value, "visit") else value
+    if isinstance(value, list) and all(hasattr(each, "perform") for each in value):
+        return "".join(map(context.perform_substitution, value))
+    if isinstance(value, list | tuple):
+        return [type(each).__name__ for each in value]
+    return value if isinstance(value, str | float | dict | None) else str(value)
 
 
 def record_loaded(action: Any, requests: list[Any], _context: Any) -> None:

@@ -56,20 +56,22 @@ class RunningRobot:
         Of a finding its lines must also hold the notes.
         """
 
-        def found() -> list[str]:
+        def matching_lines() -> list[str]:
             lines = complete_lines(self.output)[after:]
             blocks = {
-                at: "\n".join(lines[at : at + FINDING_LINES])
-                for at, line in enumerate(lines)
+                index: "\n".join(lines[index : index + FINDING_LINES])
+                for index, line in enumerate(lines)
                 if all(word in line for word in words)
             }
             return [
-                lines[at] for at, text in blocks.items() if all(note in text for note in notes)
+                lines[index]
+                for index, text in blocks.items()
+                if all(note in text for note in notes)
             ]
 
-        until(lambda: len(found()) >= times or self.popen.poll() is not None)
-        assert len(found()) >= times, (words, notes, self.text)
-        return found()[0]
+        until(lambda: len(matching_lines()) >= times or self.popen.poll() is not None)
+        assert len(matching_lines()) >= times, (words, notes, self.text)
+        return matching_lines()[0]
 
     def codes(self) -> list[str]:
         """Return the codes of what was found."""
@@ -80,8 +82,18 @@ class RunningRobot:
         return psutil.Process(self.popen.pid).children(recursive=recursive)
 
     def child(self, name: str) -> psutil.Process:
-        """Return one of its processes."""
-        return next(pid for pid in self.below(recursive=False) if name in command_of(pid)[-1:])
+        """Wait until one of its processes runs, and return it.
+
+        ``up`` prints "started" when it has forked: until the fork has executed its own
+        command, /proc shows the command line of the launcher.
+        """
+
+        def running() -> list[psutil.Process]:
+            below = self.below(recursive=False)
+            return [process for process in below if name in command_of(process)[-1:]]
+
+        assert until(lambda: bool(running())), (name, self.text)
+        return running()[0]
 
     def wait(self) -> int:
         """Wait until it has ended by itself, and return its exit code."""

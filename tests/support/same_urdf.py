@@ -21,11 +21,18 @@ FORMS = ("box", "cylinder", "sphere", "mesh")
 def same(source: str, source_folder: Path, built: str, built_folder: Path) -> list[str]:
     """Return in what the two differ; the folders are those that their relative paths begin in."""
     documents = ((source, source_folder), (built, built_folder))
-    there, here = (_robot(_found(ET.fromstring(text), folder)) for text, folder in documents)  # noqa: S314 (our own)
-    return [difference for kind in there for difference in _differ(kind, there[kind], here[kind])]
+    source_robot, built_robot = (
+        _robot(_resolve_files(ET.fromstring(text), folder))  # noqa: S314 (our own)
+        for text, folder in documents
+    )
+    return [
+        difference
+        for kind in source_robot
+        for difference in _differ(kind, source_robot[kind], built_robot[kind])
+    ]
 
 
-def _found(root: Any, folder: Path) -> Any:
+def _resolve_files(root: Any, folder: Path) -> Any:
     for element in (*root.iter("mesh"), *root.iter("texture")):
         name = element.get("filename", "")
         if name and "://" not in name:
@@ -47,15 +54,15 @@ def _robot(root: Any) -> dict[str, Any]:
     }
 
 
-def _differ(kind: str, there: Any, here: Any) -> list[str]:
-    if not isinstance(there, dict):
-        return [] if there == here else [f"{kind}: {there} is {here}"]
-    found = [f"{kind}: {name} is missing" for name in there if name not in here]
-    found += [f"{kind}: {name} is new" for name in here if name not in there]
-    for name in there:
-        if name in here and not _equal(there[name], here[name]):
-            found.append(f"{kind}: {name}: {there[name]} is {here[name]}")
-    return found
+def _differ(kind: str, expected: Any, actual: Any) -> list[str]:
+    if not isinstance(expected, dict):
+        return [] if expected == actual else [f"{kind}: {expected} is {actual}"]
+    differences = [f"{kind}: {name} is missing" for name in expected if name not in actual]
+    differences += [f"{kind}: {name} is new" for name in actual if name not in expected]
+    for name in expected:
+        if name in actual and not _equal(expected[name], actual[name]):
+            differences.append(f"{kind}: {name}: {expected[name]} is {actual[name]}")
+    return differences
 
 
 def _equal(a: Any, b: Any) -> bool:
@@ -100,11 +107,11 @@ def _inertial(link: Any) -> Any:
 
 
 def _colours(root: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    materials: dict[str, Any] = {}
     for output in [*root.findall("material"), *root.findall("link/visual/material")]:
         if len(output):
-            found.setdefault(output.get("name", ""), output)
-    return found
+            materials.setdefault(output.get("name", ""), output)
+    return materials
 
 
 def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
@@ -204,10 +211,10 @@ def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # 
 def _blocks(root: Any) -> list[Any]:
     """Return the elements next to links and joints, except those about missing ones."""
     joints = {element.get("name") for element in root.findall("joint")}
-    there = {element.get("name") for element in root.findall("link")} | joints
+    names = {element.get("name") for element in root.findall("link")} | joints
     blocks = []
     for element in root:
-        idle = element.tag == "gazebo" and element.get("reference", next(iter(there))) not in there
+        idle = element.tag == "gazebo" and element.get("reference", next(iter(names))) not in names
         idle |= element.tag == "transmission" and any(
             inner.get("name") not in joints for inner in element.findall("joint")
         )

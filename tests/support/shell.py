@@ -77,13 +77,13 @@ class Shell:
         os.write(self._master, text.encode())
 
     @property
-    def shown(self) -> str:
+    def screen_text(self) -> str:
         """What the screen shows."""
         return "\n".join(list(self.screen.display))
 
     def shows(self, *words: str) -> None:
         """Wait until the screen shows them all."""
-        assert until(lambda: all(word in self.shown for word in words)), self.shown
+        assert until(lambda: all(word in self.screen_text for word in words)), self.screen_text
 
     def resize(self, columns: int, rows: int) -> None:
         """Give the window another size."""

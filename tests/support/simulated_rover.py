@@ -9,19 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path  # noqa: TC003 (named in annotations)
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from tests.support.bags import header, message
+
 Array = NDArray[np.float64]
-STORE = get_typestore(Stores.ROS2_JAZZY)
-START_S = 1_700_000_000
 STEP_S = 0.002
 #: For so long a route leads straight ahead.
 STRAIGHT_S = 6.0
@@ -62,10 +59,11 @@ class Route:
         generator = np.random.default_rng(seed)
         self._phases = generator.uniform(0, 2 * math.pi, 2)
         self._periods = generator.uniform(7.0, 11.0, 2)
+        self._side = generator.choice([-1.0, 1.0])
         self._moves = moves
 
-    def at(self, time_s: float) -> tuple[float, float]:
-        """Return the speeds at a time: from rest straight ahead, then curves."""
+    def speeds_at(self, time_s: float) -> tuple[float, float]:
+        """Return the speeds at a time: from rest straight ahead, then curves within 3 m of it."""
         if not self._moves:
             return 0.0, 0.0
         if time_s < STRAIGHT_S:
@@ -74,7 +72,7 @@ class Route:
             math.sin(2 * math.pi * time_s / period + phase)
             for period, phase in zip(self._periods, self._phases, strict=True)
         )
-        return 0.4 + 0.3 * swing, 0.5 * curve
+        return 0.4 + 0.3 * swing, self._side * (0.4 + 0.4 * curve)
 
 
 @dataclass
@@ -91,7 +89,7 @@ def _model(mounts: dict[str, Mount], seed: int) -> Any:
     generator = np.random.default_rng(seed)
     boxes = []
     for index in range(10):
-        x, y = generator.uniform(-5.0, 5.0), generator.uniform(2.2, 4.5)
+        x, y = generator.uniform(-5.0, 5.0), generator.uniform(3.6, 4.8)
         y *= generator.choice([-1.0, 1.0])
         size = generator.uniform(0.15, 0.5, 3)
         yaw = generator.uniform(0, 90)
@@ -158,7 +156,7 @@ def simulate(
     every_cloud = round(1 / cloud_rate / STEP_S) if cloud_rate else 0
     for step in range(round(seconds / STEP_S)):
         now_s = step * STEP_S
-        speed, rate = route.at(now_s)
+        speed, rate = route.speeds_at(now_s)
         yaw = data.qpos[2]
         target = np.array([speed * math.cos(yaw), speed * math.sin(yaw), rate])
         data.qfrc_applied[:] = (target - data.qvel) * np.array([900.0, 900.0, 60.0])
@@ -205,16 +203,6 @@ def _cast(model: Any, data: Any, name: str, noise: np.random.Generator) -> Array
     scale = 0.004 * distances[sees] ** 2 if name == "camera" else 0.015
     ranges = distances[sees] + noise.normal(0, 1, int(sees.sum())) * scale
     return rays[sees] * ranges[:, None]
-
-
-def message(type_: str, **fields: Any) -> Any:
-    return STORE.types[type_](**fields)
-
-
-def header(at_s: float, frame: str) -> Any:
-    seconds, nanoseconds = divmod(round((START_S + at_s) * 1e9), 10**9)
-    stamp = message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
-    return message("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
 
 
 def vector(values: Any) -> Any:
@@ -299,15 +287,3 @@ def messages_of(measured: Measured, frames: dict[str, str]) -> list[tuple[str, f
                 )
             )
     return sorted(sent, key=lambda each: each[1])
-
-
-def write_bag(folder: Path, sent: list[tuple[str, float, str, Any]]) -> Path:
-    """Write the messages to an MCAP bag."""
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections: dict[str, Any] = {}
-        for topic, at_s, type_, each in sent:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, type_, typestore=STORE)
-            time_ns = round((START_S + at_s) * 1e9)
-            writer.write(connections[topic], time_ns, STORE.serialize_cdr(each, type_))
-    return folder

@@ -13,11 +13,13 @@ NEEDS_STOCK_ROS = {
     "tests/tf/tf2/test_tf2_oracle.py": (
         "tf2_py comes with a distribution only; tf2_answers.jsonl holds its answers"
     ),
+    "tests/launcher/test_moved_mount_ros.py": "tf2_ros comes with a distribution only",
     "tests/launcher/test_launch_file_ros.py": "ros2 launch comes with a distribution only",
     "tests/tools/exporters/test_exports_ros.py::"
     "test_ros2_launch_starts_the_tree_of_the_plan_with_stock_nodes": (
         "ros2 launch comes with a distribution only"
     ),
+    "tests/tools/exporters/test_launch_formats_ros.py": _LAUNCH,
     "tests/launcher/test_components_ros.py::"
     "test_the_containers_of_rclcpp_components_load_a_component": (
         "stock containers come with a distribution only; a stand-in loads components"

@@ -65,7 +65,7 @@ class TreeHistory:
         return self
 
     def observed(self, **more: Any) -> TreeState:
-        publishers = more.pop("publishers", tuple(self.observer.publishers.known.values()))
+        publishers = more.pop("publishers", tuple(self.observer.publishers.by_gid.values()))
         return TreeState(
             SECONDS,
             edges=tuple(self.observer.edges(END_NS)),

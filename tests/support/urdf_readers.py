@@ -86,14 +86,14 @@ class Yourdfpy:
         return {link: self.read.get_transform(link, self.base) for link in self.read.link_map}
 
     def bodies(self) -> dict[str, Body]:
-        found = {}
+        bodies = {}
         for name, link in self.read.link_map.items():
             if link.inertial:
-                own = Body(link.inertial.mass, np.zeros(3), link.inertial.inertia)
-                found[name] = (
-                    own if link.inertial.origin is None else own.moved(link.inertial.origin)
+                body = Body(link.inertial.mass, np.zeros(3), link.inertial.inertia)
+                bodies[name] = (
+                    body if link.inertial.origin is None else body.moved(link.inertial.origin)
                 )
-        return found
+        return bodies
 
 
 class Pinocchio:
@@ -133,18 +133,18 @@ class Pinocchio:
         return {name: to_base @ pose for name, pose in placed.items()}
 
     def bodies(self) -> dict[str, Body]:
-        found = {}
+        named_bodies = {}
         for frame in self.links:
             inertia = self.model.inertias[frame.parentJoint]
             if (
                 np.allclose(frame.placement.homogeneous, np.eye(4))
-                and frame.parentJoint not in found
+                and frame.parentJoint not in named_bodies
             ):
-                found[frame.parentJoint] = (
+                named_bodies[frame.parentJoint] = (
                     frame.name,
                     Body(inertia.mass, inertia.lever, inertia.inertia),
                 )
-        return {name: body for name, body in found.values() if body.mass}
+        return {name: body for name, body in named_bodies.values() if body.mass}
 
 
 class MuJoCo:
@@ -166,24 +166,24 @@ class MuJoCo:
         for name in self.moving & set(positions):
             self.data.joint(name).qpos[0] = positions[name]
         mujoco.mj_kinematics(self.model, self.data)
-        found = {self.base: np.eye(4)}
+        poses = {self.base: np.eye(4)}
         for index in range(1, self.model.nbody):
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = self.data.xmat[index].reshape(3, 3), self.data.xpos[index]
-            found[self.model.body(index).name] = pose
-        return found
+            poses[self.model.body(index).name] = pose
+        return poses
 
     def bodies(self) -> dict[str, Body]:
-        found = {}
+        bodies = {}
         for index in range(1, self.model.nbody):
             body = self.model.body(index)
             turned = np.zeros(9)
             mujoco.mju_quat2Mat(turned, body.iquat)
             rows = turned.reshape(3, 3)
-            found[body.name] = Body(
+            bodies[body.name] = Body(
                 body.mass[0], np.array(body.ipos), rows @ np.diag(body.inertia) @ rows.T
             )
-        return {name: body for name, body in found.items() if body.mass}
+        return {name: body for name, body in bodies.items() if body.mass}
 
 
 class Drake:
@@ -217,11 +217,11 @@ class Drake:
         }
 
     def bodies(self) -> dict[str, Body]:
-        found = {}
+        bodies = {}
         for index in self.plant.GetBodyIndices(self.instance):
             inertia = self.plant.get_body(index).CalcSpatialInertiaInBodyFrame(self.context)
             mass, centre = inertia.get_mass(), inertia.get_com()
             if mass > 0:
                 about = inertia.Shift(centre).CalcRotationalInertia().CopyToFullMatrix3()
-                found[self.plant.get_body(index).name()] = Body(mass, centre, about)
-        return found
+                bodies[self.plant.get_body(index).name()] = Body(mass, centre, about)
+        return bodies

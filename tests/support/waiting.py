@@ -54,8 +54,8 @@ def offences(output: str) -> list[str]:
 def gone(process: int | psutil.Process) -> bool:
     """Return whether the process has ended: nobody may have buried it yet."""
     try:
-        found = psutil.Process(process) if isinstance(process, int) else process
-        return not found.is_running() or bool(found.status() == psutil.STATUS_ZOMBIE)
+        handle = psutil.Process(process) if isinstance(process, int) else process
+        return not handle.is_running() or bool(handle.status() == psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:
         return True
 

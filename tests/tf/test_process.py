@@ -6,7 +6,7 @@ import pytest
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan import PlanProcess, Simulation
-from tfcompose.tf.process import Own, read_own, start
+from tfcompose.tf.process import OwnProcess, read_own, start
 from tfcompose.tf.ros.environment import RosError
 
 
@@ -16,8 +16,8 @@ def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
     return error
 
 
-def never(own: Own, _: Stop) -> None:
-    raise AssertionError(f"{own.process.name} begins")
+def never(own_process: OwnProcess, _: Stop) -> None:
+    raise AssertionError(f"{own_process.process.name} begins")
 
 
 def test_wrong_arguments_end_with_code_2_and_the_usage(capsys: pytest.CaptureFixture[str]) -> None:
@@ -55,13 +55,13 @@ def test_a_simulation_without_a_rate_is_refused(write: Callable[..., Path]) -> N
 
 def test_a_node_has_the_name_and_the_namespace_of_the_plan(write: Callable[..., Path]) -> None:
     file = str(write([], PlanProcess("static", "static", nodes=("/fleet/r1/frames",))))
-    own = read_own([file, "static", "--ros-args", "-r", "/tf:=tf"], "static")
-    assert (own.namespace, own.node_name, own.ros_args) == (
+    own_process = read_own([file, "static", "--ros-args", "-r", "/tf:=tf"], "static")
+    assert (own_process.namespace, own_process.node_name, own_process.ros_args) == (
         "/fleet/r1",
         "frames",
         ["-r", "/tf:=tf"],
     )
-    assert own.description.parent == own.file.parent
+    assert own_process.description.parent == own_process.file.parent
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
 def test_what_ros_refuses_ends_with_code_1_and_its_words(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refused(_own: Own, _stop: Stop) -> None:
+    def refused(_process: OwnProcess, _stop: Stop) -> None:
         raise RosError("ROS cannot start a node")
 
     monkeypatch.setattr("tfcompose.tf.process.missing_ros", lambda: None)

@@ -79,10 +79,10 @@ def completions(path: Path, folder: Path, line: str) -> set[str]:
 
 def findings(done: subprocess.CompletedProcess[str]) -> list[str]:
     """Return the findings that were printed: place and code."""
-    found = re.findall(
+    places = re.findall(
         r"^(?:(\S+:\d+:\d+): )?(?:error|warning)\[(\w+)\]", done.stdout + done.stderr, re.MULTILINE
     )
-    return [f"{place} {code}".strip() for place, code in found]
+    return [f"{place} {code}".strip() for place, code in places]
 
 
 def test_its_command_runs_and_stands_in_the_help(run: Run, acme: Path, tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.plan.file import read_plan
 file = Path("built/plan.json")
 plan = read_plan(file.read_text(), str(file))
-environment = lambda base, ros, own: dict(base)
+environment = lambda base, ros, is_built_in: dict(base)
 _, found = commands_of(plan, plan.managed, file, os.environ, environment)
 print(json.dumps([f"{one.code}: {one.message}" for one in found]))
 """
@@ -156,8 +156,8 @@ def hindrances(run_with: Run, path: str | Path, folder: Path, **environment: str
     assert run_with(path, folder, "build", "-o", "built").returncode == 0
     env = os.environ | {"PYTHONPATH": str(path)} | environment
     done = processes.run([sys.executable, "-c", PREFLIGHT], cwd=folder, env=env, check=True)
-    found: list[str] = json.loads(done.stdout)
-    return found
+    messages: list[str] = json.loads(done.stdout)
+    return messages
 
 
 def test_its_process_reads_its_section_of_the_plan(
@@ -185,8 +185,8 @@ def test_a_preflight_check_that_crashes_is_a_bug_of_the_tool(
     more = f"preflight='bell:no_such_function', keys=({key},)"
     write_tool(tmp_path / "site", "bell", f"{spec}\n{TOOL}name='bell', package='bell', {more})")
     write_robot(tmp_path, "bell: {}")
-    (found,) = hindrances(run_with, tmp_path / "site", tmp_path)
-    assert re.match("TF903: bell:no_such_function of bell crashed: AttributeError", found)
+    (message,) = hindrances(run_with, tmp_path / "site", tmp_path)
+    assert re.match("TF903: bell:no_such_function of bell crashed: AttributeError", message)
 
 
 def test_its_rule_finds_at_its_place_and_can_be_silenced_and_explained(
@@ -308,9 +308,7 @@ def test_a_command_whose_module_does_not_load_is_one_finding(
     assert "Traceback" not in done.stderr
 
 
-def test_tools_of_other_packages_are_loaded_only_where_something_is_unknown(
-    acme: Path, tmp_path: Path
-) -> None:
+def test_foreign_tools_load_only_if_a_name_is_unknown(acme: Path, tmp_path: Path) -> None:
     code = "from tfcompose.cli import main; main(sys.argv[1:]); print('acme_tool' in sys.modules)"
 
     def loads(*arguments: str) -> bool:

@@ -12,8 +12,8 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     try:
         from tfcompose.cli import (
-            parser,  # here, so that Ctrl-C while it loads ends without a traceback
+            parser,  # imported here, so that Ctrl-C during the import ends without a traceback
         )
     except KeyboardInterrupt:
-        return 130  # as a shell has it for a program ended by Ctrl-C
+        return 130  # the exit code of a shell for a program that Ctrl-C ended
     return parser.main(argv)

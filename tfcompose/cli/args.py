@@ -5,15 +5,14 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import overlays_of
+from tfcompose.cli.compiling import load_robot, overlays_of
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, printable, reject
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.spec.language import BuildInputs, compose, profiles_in, validate, with_includes
+from tfcompose.spec.language import BuildInputs, compose, validate
 from tfcompose.spec.language.args import as_given
-from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -26,13 +25,14 @@ if TYPE_CHECKING:
 def show_args(arguments: Namespace) -> int:
     """Print the arguments of the robot file.
 
-    Exit code 0, or as for ``build`` if it cannot be read.
+    Return 0, or the exit code of ``build`` if the file cannot be read.
     """
     file = _file(arguments)
     if is_plan(file):
         fail(f"{file} is a built plan; only robot files have arguments", UNREADABLE)
     try:
-        args, _ = args_and_profiles(file, arguments.profiles, overlays_of(arguments))
+        source = load_robot(file)
+        args = args_of(source, arguments.profiles, overlays_of(arguments, source))
     except RejectedError as error:
         reject(error.findings)
     if not args:
@@ -42,22 +42,20 @@ def show_args(arguments: Namespace) -> int:
     return 0
 
 
-def args_and_profiles(
-    file: str, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()
-) -> tuple[Mapping[str, ArgSpec], tuple[str, ...]]:
-    """Return the arguments of a robot file with its ``profiles`` and overlays, and all profiles.
+def args_of(
+    source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()
+) -> Mapping[str, ArgSpec]:
+    """Return the arguments of a robot file with its ``profiles`` and overlays.
 
     Raises:
-        RejectedError: with the findings of a file that cannot be read.
+        RejectedError: if a file cannot be read; it contains the findings.
     """
-    source = with_includes(load(read_text(file), file), read_text)
-    names = tuple(profiles_in(source))
-    source = compose(source, profiles, overlays, read=read_text)
-    return validate(source, inputs=BuildInputs({}, os.environ)).spec.args, names
+    merged = compose(source, profiles, overlays, read=read_text)
+    return validate(merged, inputs=BuildInputs({}, os.environ)).spec.args
 
 
 def _file(arguments: Namespace) -> str:
-    """Return the robot file among the parsed arguments, as each command names it."""
+    """Return the path of the robot file from the parsed arguments."""
     for name in ("file", "files", "old", "what"):
         value = getattr(arguments, name, None)
         if value:

@@ -1,6 +1,6 @@
 """A build in a separate process.
 
-That keeps the compiler out of the launcher's memory, which lasts as long as the robot runs.
+The launcher's process, which lasts as long as the robot runs, then never contains the compiler.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 class BuildProcess:
     """Builds a robot in a child process while this process continues.
 
-    The child prints its findings on the same terminal. It has its own process group, so that it
-    receives a Ctrl-C only once, from this process: an error in the ``with`` block interrupts the
-    build and waits for its end.
+    The child prints its findings on the same terminal. The child has its own process group, so
+    that it receives a Ctrl-C only once, from this process. An error in the ``with`` block
+    interrupts the build and waits for its end.
     """
 
     def __init__(self, arguments: Namespace) -> None:
@@ -40,7 +40,7 @@ class BuildProcess:
         sys.stderr.flush()
         mask = signal.pthread_sigmask(
             signal.SIG_BLOCK, [signal.SIGINT]
-        )  # what Python does after a fork prints errors
+        )  # Python's handlers after a fork print errors
         self._pid = os.fork()
         if self._pid == 0:
             os._exit(_build(arguments, answer, mask))
@@ -66,8 +66,8 @@ class BuildProcess:
         """Wait for the build to end; return its plan file and the warnings it printed.
 
         Raises:
-            SystemExit: with the exit code of a failed build, which has printed the reason.
-            OSError: the one that ended the build.
+            SystemExit: if the build failed; with its exit code. The build has printed the reason.
+            OSError: if an OSError ended the build.
         """
         with open(self._pipe, "rb", closefd=False) as pipe:
             answer = pipe.read()
@@ -75,8 +75,8 @@ class BuildProcess:
         if code < 0:
             fail(f"the build was killed by {signal.Signals(-code).name}")
         if code == 0:
-            file, _, found = answer.partition(b"\0")
-            return Path(os.fsdecode(file)), msgspec.json.decode(found, type=list[Finding])
+            file, _, findings_json = answer.partition(b"\0")
+            return Path(os.fsdecode(file)), msgspec.json.decode(findings_json, type=list[Finding])
         if answer:
             raise OSError(int(answer), os.strerror(int(answer)))
         raise SystemExit(code)
@@ -91,8 +91,8 @@ class BuildProcess:
 def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
     """Build and return the exit code.
 
-    Writes the plan's path and the findings to ``answer``, or the number of an OSError. ``mask`` is
-    the signal mask from before the fork.
+    The function writes the plan's path and the findings to ``answer``, or the number of an
+    OSError. ``mask`` is the signal mask from before the fork.
     """
     code = FAILED
     try:
@@ -101,7 +101,7 @@ def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
         for number in (
             signal.SIGTTOU,
             signal.SIGTTIN,
-        ):  # a terminal may stop other groups that write to it, or read
+        ):  # a terminal may stop background groups that read or write
             signal.signal(number, signal.SIG_IGN)
         from tfcompose.cli.plans import PLAN
         from tfcompose.cli.writing import build

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 class ArgumentRow(NamedTuple):
-    """An argument of a command, as its help shows it."""
+    """An argument of a command in the command's help."""
 
-    #: Its longest option, ``--profile``, or the name of its value in the parsed arguments.
+    #: The longest option, such as ``--profile``, or the name of the value in the parsed arguments.
     name: str
-    #: ``-p NAME, --profile NAME``.
+    #: All options with their value, such as ``-p NAME, --profile NAME``.
     form: str
     help: str
 
@@ -33,7 +33,10 @@ class _Formatter(HelpFormatter):
 
 
 class Parser(ArgumentParser):
-    """Parser that suggests the nearest option and names the help."""
+    """Parser that suggests the nearest option and refers to the help."""
+
+    #: The required arguments as the user types them.
+    _required = ""
 
     def error(self, message: str) -> NoReturn:
         """Print the error and end the command.
@@ -48,21 +51,32 @@ class Parser(ArgumentParser):
             options = [
                 token.partition("=")[0] for token in message.split() if token.startswith("-")
             ]
-            known = [text for action in self._actions for text in action.option_strings]
+            options_of_command = [
+                text for action in self._actions for text in action.option_strings
+            ]
             near = [
                 match
                 for option in options
-                for match in difflib.get_close_matches(option, known, 1)
+                for match in difflib.get_close_matches(option, options_of_command, 1)
             ]
             advice = f"did you mean {near[0]}?" if near else advice
+        elif message.startswith("the following arguments are required"):
+            advice = f"type {self.prog} {self._required}; {advice}"
         fail(f"{self.prog.partition(' ')[2]}: {message}; {advice}", UNREADABLE)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Return the parsed arguments; ``cameras:=4`` is an argument of the robot file.
+        """Parse the command line; ``cameras:=4`` sets an argument of the robot file.
 
-        It may be anywhere on the command line.
+        Arguments of the robot file may be anywhere on the command line.
         """
         argv = list(args or ())
+        # argparse takes only plain negative numbers as values; no option begins with a digit.
+        self._negative_number_matcher = _NEGATIVE
+        required = [action for action in self._actions if action.required]
+        self._required = " ".join(  # argparse requires no option beside an argument
+            " ".join([*action.option_strings[-1:], str(action.metavar or action.dest)])
+            for action in sorted(required, key=lambda action: bool(action.option_strings))
+        )
         ros_args: list[str] = []
         takes_args = any(action.dest == "arg_values" for action in self._actions)
         if any(action.dest == "ros_args" for action in self._actions):
@@ -78,7 +92,10 @@ class Parser(ArgumentParser):
         return arguments
 
     def _settings(self, argv: Sequence[str]) -> tuple[list[str], list[str]]:
-        """Return arguments NAME:=VALUE, except those that belong to an option, and the rest."""
+        """Return two lists: arguments NAME:=VALUE, and all other arguments.
+
+        An argument NAME:=VALUE that belongs to an option is in the second list.
+        """
         renaming = {
             option
             for action in self._actions
@@ -112,9 +129,9 @@ class Parser(ArgumentParser):
 
 
 def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the command line without ROS arguments, and these, as rcl separates them.
+    """Return two lists: the command line without ROS arguments, and the ROS arguments.
 
-    They follow ``--ros-args``, up to the end or ``--``.
+    ROS arguments follow ``--ros-args``, up to the end or ``--``, as in rcl.
     """
     rest: list[str] = []
     ros_args: list[str] = []
@@ -129,6 +146,8 @@ def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
     return rest, ros_args
 
 
+#: The beginning of a negative number, which may have a unit: -0.5deg.
+_NEGATIVE = re.compile(r"-\.?\d")
 #: A word that gives an argument of a robot, xacro or launch file its value.
 _GIVEN = re.compile(r"[^\s=:-][^\s=:]*:=")
 
@@ -151,7 +170,7 @@ class CommandModule(Protocol):
 def command_parser(name: str, command: CommandModule, columns: int = 0) -> Parser:
     """Return the parser of a command, without the options that tools add to it.
 
-    Its help is ``columns`` wide, by default as the terminal, and 100 at most.
+    The help is ``columns`` wide, at most 100. The default is the terminal's width.
     """
     width = columns or min(100, size_of(1)[0] - 2)
     parser = Parser(

@@ -1,6 +1,6 @@
-"""Compilation of the files that the command line names, with presets and overlays.
+"""Compilation of the files on the command line, with presets and overlays.
 
-Also the compiler's access to this machine: files, packages, and the volumes of meshes.
+The module also gives the compiler access to this machine: files, packages, and volumes of meshes.
 """
 
 from __future__ import annotations
@@ -58,14 +58,15 @@ if TYPE_CHECKING:
 
 
 PRESETS = Path(__file__).parents[1] / "data" / "presets"
-#: A package names, under this group, the module whose folder holds its presets.
+#: The entry point group for packages with presets. An entry point names the module whose folder
+#: contains the presets.
 PRESET_GROUP = "tfcompose.presets"
-#: A ROS package registers its presets under this resource type of the ament index.
+#: The resource type in the ament index under which a ROS package registers its presets.
 PRESET_INDEX = "share/ament_index/resource_index/tfcompose_presets"
 
 
 def library(read: Callable[[str], str] = read_text) -> Library:
-    """Return the presets known without a robot file: tfcompose's own, then those of packages."""
+    """Return the presets that need no robot file: tfcompose's own, then the packages' presets."""
     return Library((str(PRESETS),), PresetFolders(read), str(PRESETS))
 
 
@@ -75,7 +76,7 @@ class PresetFolders:
 
     #: Returns the text of a file or raises RejectedError.
     open_text: Callable[[str], str] = read_text
-    #: Whether a path may be accessed.
+    #: Returns whether a path may be accessed.
     allows: Callable[[str], bool] = lambda _: True
 
     def has(self, path: str) -> bool:
@@ -87,11 +88,11 @@ class PresetFolders:
         return self.allows(path) and is_folder(path)
 
     def read(self, path: str) -> str:
-        """Return its text; raises RejectedError."""
+        """Return the text of a file. Raises RejectedError."""
         return self.open_text(path)
 
     def models(self, folder: str) -> list[str]:
-        """Return the names, vendor/model, of the presets in the folder."""
+        """Return the names (vendor/model) of the presets in the folder."""
         files = sorted(
             (file.parent.name, file.stem)
             for file in Path(folder).glob("*/*.yaml")
@@ -100,14 +101,14 @@ class PresetFolders:
         return [f"{vendor}/{model}" for vendor, model in files if vendor != "nodes"]
 
     def packages(self) -> list[str]:
-        """Return the folders from installed Python and ROS packages."""
+        """Return the preset folders of installed Python and ROS packages."""
         return _preset_packages()
 
 
 @cache
 def _preset_packages() -> list[str]:
-    """Return the preset folders of Python packages, then of ROS packages, by name."""
-    from importlib.metadata import entry_points  # needed only where a preset is in no other folder
+    """Return the preset folders of Python packages, then of ROS packages, sorted by name."""
+    from importlib.metadata import entry_points  # needed only if no other folder has the preset
 
     folders: list[str] = []
     for entry in sorted(entry_points(group=PRESET_GROUP), key=lambda entry: entry.name):
@@ -122,8 +123,9 @@ def _preset_packages() -> list[str]:
 def _ros_preset_packages() -> list[str]:
     """Return the folders that ROS packages register in the ament index of the sourced workspaces.
 
-    A marker names the folder, relative to its prefix; an empty one means ``share/NAME/presets``.
-    If several workspaces have a package, the first one counts, as in ROS.
+    The file in the index names the folder, relative to the workspace's prefix. An empty file means
+    ``share/NAME/presets``. If several workspaces have a package, the first workspace counts, as in
+    ROS.
     """
     folders: dict[str, str] = {}
     for prefix in _ament_prefixes():
@@ -140,50 +142,75 @@ def _ament_prefixes() -> tuple[str, ...]:
     return tuple(prefix for prefix in prefixes if prefix)
 
 
+def load_robot(file: str, read: Callable[[str], str] = read_text) -> Source:
+    """Return a robot file with its includes. ``read`` returns a file's text.
+
+    Raises:
+        RejectedError: if a file cannot be read or is not YAML.
+    """
+    return with_includes(load(read(file), file), read)
+
+
 def overlays_of(
-    arguments: Namespace, read: Callable[[str], str] = read_text, source: Source | None = None
+    arguments: Namespace, source: Source, read: Callable[[str], str] = read_text
 ) -> list[Source]:
     """Return the overlays of --robot, --overlay and --set, in that order.
 
-    ``read`` returns a file's text. ``source`` is the robot file, which names the folder of the
-    overlays of single robots; without it there are none of --robot.
+    ``source`` is the robot file, which names the folder with an overlay for each robot. ``read``
+    returns a file's text.
 
     Raises:
         RejectedError: if a file cannot be read or is not YAML, or a setting is malformed.
     """
     files = [with_includes(load(read(file), file), read) for file in arguments.overlays]
     overlays = [*files, *(set_value(setting) for setting in arguments.settings)]
-    path = _robot_overlay(arguments, source) if source else None
+    path = robot_overlay(arguments, source)
     return [load_robot_overlay(path, read), *overlays] if path else overlays
 
 
-def _robot_overlay(arguments: Namespace, source: Source) -> str | None:
-    """Return the overlay of --robot, or of this computer for a command that starts robots.
+def robot_overlay(arguments: Namespace, source: Source) -> str | None:
+    """Return the overlay file for --robot, None without an overlay.
+
+    For a command that starts robots, the default of --robot is this computer's name.
 
     Raises:
-        RejectedError: if the named robot has none, or the folder is missing.
+        RejectedError: if the named robot has no overlay, or the folder is missing.
     """
     robot, here = getattr(arguments, "overlay_robot", None), os.uname().nodename
     if robot is None and not getattr(arguments, "by_hostname", False):
         return None
-    files = overlay_files(source, lambda folder: names_in(folder) if is_folder(folder) else None)
+    files = _overlay_files(source)
     if robot is None and here not in robots_with_overlay(files):
         return None
     return find_overlay(source, here if robot is None else robot, files)
 
 
+def robots_of(source: Source) -> list[str]:
+    """Return the robots that have an overlay.
+
+    Raises:
+        RejectedError: if the folder of the overlays is missing.
+    """
+    return robots_with_overlay(_overlay_files(source))
+
+
+def _overlay_files(source: Source) -> list[str]:
+    return overlay_files(source, lambda folder: names_in(folder) if is_folder(folder) else None)
+
+
 def disk_of(file: str, arguments: Namespace) -> Disk:
-    """Return this machine's files for a robot file named on the command line."""
+    """Return access to this machine's files for a robot file on the command line."""
     return disk(trusts_files=arguments.trust, sources=[file])
 
 
 def inputs_of(arguments: Namespace, day: date | None = None) -> BuildInputs:
     """Return the robot's inputs from command line and environment.
 
-    ``day`` is the one whose calibrations apply; None: those that still hold.
+    ``day`` selects the calibrations that were valid on that day. None selects those that are still
+    valid.
 
     Raises:
-        SystemExit: after reporting wrong ROS arguments.
+        SystemExit: after wrong ROS arguments are reported.
     """
     args = {
         name: ArgValue(value, Span(f"{name}:={value}"))
@@ -193,10 +220,10 @@ def inputs_of(arguments: Namespace, day: date | None = None) -> BuildInputs:
 
 
 def compile_or_exit(file: str, arguments: Namespace, day: date | None = None) -> Robot:
-    """Return the robot on the day, which has no errors; warnings are printed.
+    """Print warnings and return the robot, compiled without errors for the day.
 
     Raises:
-        SystemExit: after printing its errors.
+        SystemExit: after the robot's errors are printed.
     """
     return compile_without_errors(file, arguments, day)[0]
 
@@ -207,19 +234,30 @@ def compile_file(
     day: date | None = None,
     read: Callable[[str], str] = read_text,
 ) -> Compiled:
-    """Return the compiled robot file; ``read`` returns a file's text.
+    """Return the compiled robot file. ``read`` returns a file's text.
 
     Raises:
         RejectedError: if a file cannot be read.
     """
-    source = with_includes(load(read(file), file), read)
+    source = load_robot(file, read)
+    return compile_loaded(source, overlays_of(arguments, source, read), arguments, day, read)
+
+
+def compile_loaded(
+    source: Source,
+    overlays: Sequence[Source],
+    arguments: Namespace,
+    day: date | None = None,
+    read: Callable[[str], str] = read_text,
+) -> Compiled:
+    """Return the compiled robot file that is loaded, with these overlays merged over it."""
     return compile_source(
         source,
         library(),
         arguments.profiles,
-        overlays_of(arguments, read, source=source),
+        overlays,
         read,
-        disk_of(file, arguments),
+        disk_of(source.file, arguments),
         inputs_of(arguments, day),
     )
 
@@ -227,10 +265,10 @@ def compile_file(
 def compile_without_errors(
     file: str, arguments: Namespace, day: date | None = None
 ) -> tuple[Robot, Compiled]:
-    """Return the robot and its compiled files; print warnings.
+    """Print warnings and return the robot with its compiled files.
 
     Raises:
-        SystemExit: after printing its errors.
+        SystemExit: after the robot's errors are printed.
     """
     try:
         compiled = compile_file(file, arguments, day)
@@ -246,7 +284,7 @@ def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]
     """Return the edges from ``a`` and from ``b`` up to their common ancestor.
 
     Raises:
-        SystemExit: after reporting a missing frame, or that the two are not connected.
+        SystemExit: if a frame is missing, or if the frames are not connected.
     """
     for frame in (a, b):
         if frame not in robot.frames:
@@ -264,7 +302,7 @@ def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]
 
 
 def _ancestry(robot: Robot, frame: str) -> list[Edge]:
-    above = {edge.child: edge for edge in reversed(robot.edges)}  # of several parents the first
+    above = {edge.child: edge for edge in reversed(robot.edges)}  # the first of several parents
     chain = []
     while edge := above.get(frame):
         chain.append(edge)
@@ -282,10 +320,11 @@ def disk(
     folders: Sequence[str] = (),
     is_strict: bool = False,
 ) -> Disk:
-    """Return this machine's files, with the packages of the sourced workspaces.
+    """Return access to this machine's files and to the packages of the sourced workspaces.
 
-    Xacro files may also read the trees of ``sources``, and these ``folders``; everything if files
-    are trusted. With ``is_strict`` no xacro file is expanded if the kernel cannot confine it.
+    Xacro files may also read the trees of ``sources`` (see ``Reach.add_tree``), and ``folders``.
+    Trusted files may read everything. With ``is_strict``, xacro files are not expanded if the
+    kernel cannot confine xacro.
     """
     prefixes = tuple(
         prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix
@@ -300,8 +339,8 @@ def disk(
         for folder in folders:
             reach.add_folder(folder)
         if use is None or not use.macro:
-            read_text(file)  # a file that cannot be read is refused as everywhere
-        from tfcompose.compiler.urdf.expand import Sandbox, expand  # loads what runs xacro
+            read_text(file)  # rejects a file that cannot be read
+        from tfcompose.compiler.urdf.expand import Sandbox, expand  # imports xacro
 
         sandbox = Sandbox(reach, print_output, report_missing_confinement, is_strict)
         return expand(file, packages, arguments, use, sandbox)
@@ -319,7 +358,10 @@ def disk(
 
 @cache
 def _is_pointer(path: str) -> bool:
-    """Return whether the file is a Git LFS pointer, as checkouts without LFS have (spec v1)."""
+    """Return whether the file is a Git LFS pointer (LFS specification v1).
+
+    A checkout without LFS contains such files.
+    """
     with contextlib.suppress(OSError), Path(path).open("rb") as file:
         return file.read(len(_POINTER)) == _POINTER
     return False
@@ -347,7 +389,10 @@ def moments(path: str, scale: Vector) -> Moments:
 
 
 def print_output(file: str, text: str) -> None:
-    """Print the output of a file that was run to read it, on stderr after the file's name."""
+    """Print on stderr what a file printed when it was run.
+
+    Each line begins with the file's name.
+    """
     for line in text.splitlines():
         sys.stderr.write(f"{printable(file)}: {plain(line)}\n")
 
@@ -360,7 +405,7 @@ _NOT_HELD = {
 
 
 def report_missing_confinement(missing: Sequence[str]) -> None:
-    """Print the missing sandbox features of the kernel, once each."""
+    """Print each sandbox feature that the kernel lacks, once."""
     for feature in missing:
         if feature not in _reported:
             _reported.add(feature)

@@ -1,6 +1,7 @@
-"""Completion of a command line: commands, options, their values, and names of the robot file.
+"""Completion of a command line: commands, options, values, and names in the robot file.
 
-argcomplete reads the line and answers the shell; this module supplies the names for each argument.
+argcomplete parses the line and answers the shell. This module supplies the names for each
+argument.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def complete(commands: Mapping[str, CommandModule]) -> None:
     """Print completions of the argument at the shell's cursor, and exit.
 
     Raises:
-        SystemExit: always, with 0.
+        SystemExit: always, with code 0.
     """
     line, point = os.environ["COMP_LINE"], int(os.environ["COMP_POINT"])
     _quote, _prefix, _suffix, typed, _break = split_line(line, point)
@@ -72,7 +73,7 @@ def _expand_tilde(argument: str) -> str:
 
 
 class _Completer:
-    """Completes one argument of a command line, by names and by files."""
+    """Completes an argument of a command line with names and files."""
 
     def __init__(self, action: Action, argv: Sequence[str], commands: Iterable[str]) -> None:
         self._source = _source_of(action, argv[0], commands)
@@ -83,7 +84,7 @@ class _Completer:
         self._is_list = action.metavar == "CODES"
 
     def __call__(self, prefix: str, **_: object) -> list[str]:
-        """Return completions of the argument; for a list with commas, those of its last part."""
+        """Return completions of the argument, or of the last part of a list with commas."""
         first, comma, _last = prefix.rpartition(",") if self._is_list else ("", "", prefix)
         names = [f"{first}{comma}{name}" for name in self._source(self._argv)]
         return [*names, *FilesCompleter()(prefix)] if self._is_path else names
@@ -102,7 +103,10 @@ def _source_of(action: Action, command: str, commands: Iterable[str]) -> Source:
 
 
 def _frames(argv: Sequence[str]) -> list[str]:
-    """Return the frames of the robot file; nothing before it is named, to complete files."""
+    """Return the frames of the robot file on the line, or of ``robot.yaml`` here.
+
+    For ``explain`` without a file return nothing, because the next argument may be a file.
+    """
     from tfcompose.cli.compiling import library
     from tfcompose.compiler.compile import compile_source
     from tfcompose.spec.load import load
@@ -144,7 +148,7 @@ def _codes_or_frames(argv: Sequence[str]) -> list[str]:
 
 
 def _section(name: str, argv: Sequence[str]) -> list[str]:
-    """Return the names in a section of the given robot file, or of the one in this folder."""
+    """Return the names in a section of the robot file on the line, or of ``robot.yaml`` here."""
     from tfcompose.spec.load import load
 
     file = next(
@@ -189,7 +193,7 @@ def _robots(_: Sequence[str]) -> list[str]:
 
 
 def _processes(_: Sequence[str]) -> list[str]:
-    """Return the processes of the robots that run in this ROS domain."""
+    """Return the names of all processes of robots in this ROS domain."""
     from tfcompose.cli.runs import in_scope, plan_of_run, running
     from tfcompose.launcher.runtime_dir import RuntimeDirError
 
@@ -200,7 +204,8 @@ def _processes(_: Sequence[str]) -> list[str]:
     return [process.name for plan in plans if plan for process in plan.processes]
 
 
-#: What an argument can be: by its command, or for all commands that have it, and its name.
+#: The possible values of an argument, by (command, argument). An empty command means all commands
+#: with that argument.
 _SOURCES: dict[tuple[str, str], Source] = {
     ("", "profiles"): _profiles,
     ("", "robot"): _robots,

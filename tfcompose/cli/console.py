@@ -1,4 +1,4 @@
-"""Output of ``up``: log lines prefixed with their process, reports, and a status line."""
+"""Output of ``up``: reports, a status line, and log lines after the name of their process."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import Notice, PlanChange
     from tfcompose.model.plan import Plan
 
-#: Colours that differ on dark and light terminals; a process keeps its own by its place in the
-#: plan.
+#: Colours that are readable on dark and light terminals. A process has the same colour in every
+#: run, by its position in the plan.
 COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))
-#: Whose lines the launcher's own are.
+#: The name before the launcher's own lines.
 LAUNCHER = "tfcompose"
 NAMED_AT_MOST = 4
-#: Of so many last lines of a process it is known that they were printed; findings quote fewer.
+#: Number of a process's last printed lines that are remembered. Findings quote fewer lines.
 QUOTED_AT_MOST = 40
-#: States that need no line of their own: the edges say more.
+#: States that are not printed, because the edges are more informative.
 UNREPORTED = frozenset({"starting", "stopped"})
 
-#: The status line is drawn at most so often, in seconds.
+#: Minimum time between two drawings of the status line, in seconds.
 STATUS_EVERY_S = 0.2
-#: Columns that stay free: the terminal writes ``^C`` there, and must not begin a new line.
+#: Columns that stay free. The terminal prints ``^C`` there, and must not begin a new line for it.
 STATUS_FREE_COLUMNS = 3
 STATUS_NAMED_AT_MOST = 3
 
@@ -69,7 +69,7 @@ def prefix_of(name: str, width: int) -> str:
 
 
 class Output(Protocol):
-    """Destination of lines; ``log``: a process wrote it."""
+    """Destination of lines. ``log`` means that a process wrote the line."""
 
     def write(self, text: str, *, log: bool = False) -> None:
         """Write the text.
@@ -90,7 +90,7 @@ class StandardOutput:
 
 
 class Nowhere:
-    """Discards lines that are kept elsewhere."""
+    """Discards lines, because they are stored elsewhere."""
 
     def write(self, text: str, *, log: bool = False) -> None:
         """Do nothing."""
@@ -99,9 +99,9 @@ class Nowhere:
 class Console:
     """Writes notices as lines: ``name | text``, coloured on a terminal.
 
-    ``address_of`` returns the page of a finding's code. ``keep`` receives each line without
-    colours, and may return an error to print; ``status`` stays below the lines. A process's own
-    lines are only kept, or only written, if its ``output`` says so.
+    ``address_of`` returns the address of the page about a finding's code. ``keep`` receives each
+    line without colours, and may return an error to print. ``status`` stays below the lines. The
+    ``output`` of a process decides whether its lines are kept, written, or both.
     """
 
     def __init__(  # noqa: PLR0913 (all but two are named)
@@ -126,15 +126,15 @@ class Console:
         self._outputs = {
             process.name: process.output for process in plan.processes if process.output != "both"
         }
-        #: The last lines of each process, as findings quote them: what was printed is not printed
-        #: again.
+        #: The last printed lines of each process, in the form of quotes in findings. Findings do
+        #: not print these lines again.
         self._printed: dict[str, deque[str]] = {}
         self._hosts = {
             process.name: f"host {process.host}" for process in plan.processes if process.host
         }
 
     def __call__(self, notice: Notice) -> None:
-        """Write the lines of a notice at once.
+        """Write all lines of a notice.
 
         Raises:
             OSError: if the reader is gone.
@@ -225,7 +225,7 @@ class Console:
     @_write.register
     def _(self, notice: Replanned) -> None:
         self._width = max(self._width, *map(len, ("", *notice.added)))
-        changes = describe_changes(notice, ("changed", "new", "gone", "new description"))
+        changes = describe_changes(notice, ("changed", "new", "gone", "new description", "moved"))
         self._say(f"new plan: {changes or 'nothing to restart'}")
         if notice.held:
             self._say(self._paint(describe_vanished_edges(notice.held), YELLOW))
@@ -289,7 +289,7 @@ class Console:
         )
 
     def _is_printed(self, quoted: str) -> bool:
-        """Return whether a quoted line is among the last ones printed by its process."""
+        """Return whether the quoted line is among the last printed lines of a process."""
         return any(quoted in lines for lines in self._printed.values())
 
     def _say(self, text: str) -> None:
@@ -308,14 +308,14 @@ class Console:
         keep: bool = True,
         is_rendered: bool = False,
     ) -> None:
-        """Write a line; of control sequences in other programs' lines, keep only colours."""
+        """Write a line. In lines of other programs, keep no control sequences except colours."""
         fault = self._kept(name, text) if keep else None
         clear = self._status.clear() if self._status else ""
-        shown = text
+        printed = text
         if not is_rendered:
-            shown = keep_colours(text) if self._colour else plain(text)
+            printed = keep_colours(text) if self._colour else plain(text)
         self._output.write(
-            f"{clear}{self._paint(prefix_of(name, self._width), colour)} {shown}\n", log=log
+            f"{clear}{self._paint(prefix_of(name, self._width), colour)} {printed}\n", log=log
         )
         if fault:
             self._complain(fault)
@@ -329,21 +329,23 @@ class Console:
 
 
 def describe_changes(change: PlanChange | Replanned, labels: Sequence[str]) -> str:
-    """Return the processes that another plan changes, adds, removes or gives a new description.
+    """Return the processes and edges that another plan affects.
 
-    Each group has its label, in this order; empty if no process has to restart.
+    The groups are the processes that the plan changes, adds, removes, or gives a new description,
+    and the edges that it moves without a restart. ``labels`` has a label for each group, in this
+    order. The text is empty if all groups are empty.
     """
+    moved = (list_names(change.moved, NAMED_AT_MOST),) if change.moved else ()
+    groups = (change.changed, change.added, change.removed, change.described, moved)
     return "; ".join(
         f"{label}: {', '.join(names)}"
-        for label, names in zip(
-            labels, (change.changed, change.added, change.removed, change.described), strict=True
-        )
+        for label, names in zip(labels, groups, strict=True)
         if names
     )
 
 
 def describe_vanished_edges(edges: tuple[str, ...]) -> str:
-    """Return the warning about fixed edges that vanished."""
+    """Return a warning about fixed edges that have disappeared."""
     named = list_names(edges, NAMED_AT_MOST)
     return (
         f"running listeners keep {named}: tf2 never forgets a fixed frame; restart RViz and other"
@@ -352,9 +354,9 @@ def describe_vanished_edges(edges: tuple[str, ...]) -> str:
 
 
 def _start_table(notice: AllReady) -> list[str]:
-    """Return a line per process with the times it started and was ready, and the total.
+    """Return the table of start times: a line for each process, and a line with the total.
 
-    Times are seconds from the start.
+    Each line has the times of start and readiness in seconds from the start of the robot.
     """
     width = max(len(row.process) for row in notice.rows)
     lines = [f"{'process':<{max(width, 7)}}  started   ready"]
@@ -365,9 +367,9 @@ def _start_table(notice: AllReady) -> list[str]:
 
 
 class StatusLine:
-    """The line below the log on a terminal: running processes, live edges, and missing ones.
+    """The line below the log on a terminal: running processes, live edges and missing edges.
 
-    It counts notices. ``columns`` returns the terminal's width.
+    The line follows from notices. ``columns`` returns the terminal's width.
     """
 
     def __init__(
@@ -382,11 +384,11 @@ class StatusLine:
         self._live: dict[str, int] = {}
         self._findings = {"error": 0, "warning": 0}
         self._stopping = self._ready = self._ended = self._drawn = False
-        self._shown = ""
+        self._text = ""
         self._at = 0.0
 
     def take(self, notice: Notice) -> None:
-        """Count the notice."""
+        """Update the counts from the notice."""
         if isinstance(notice, ProcessState):
             self._states[notice.process] = notice.state
             if notice.state not in ("running", "expected", "stopping"):
@@ -404,19 +406,19 @@ class StatusLine:
 
     def clear(self) -> str:
         """Return the control sequence that clears the line."""
-        self._shown = ""
+        self._text = ""
         return CLEAR_LINE if self._drawn else ""
 
     def draw(self) -> str:
         """Return the control sequence that redraws the line.
 
-        Empty if the line is unchanged, or was just drawn.
+        The sequence is empty if the line is unchanged, or was drawn a moment ago.
         """
         text = "" if self._ended else self._fitting(max(self._columns() - STATUS_FREE_COLUMNS, 1))
         now = self._clock()
-        if text == self._shown or (self._shown and now - self._at < STATUS_EVERY_S):
+        if text == self._text or (self._text and now - self._at < STATUS_EVERY_S):
             return ""
-        before, self._shown, self._at, self._drawn = self._shown, text, now, True
+        before, self._text, self._at, self._drawn = self._text, text, now, True
         return f"{CLEAR_LINE}{text}" if before else text
 
     def _fitting(self, columns: int) -> str:
@@ -439,14 +441,14 @@ class StatusLine:
             f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count
         ]
         running = sum(self._runs(name) for name in self._owned)
-        shown = [f"{running}{of}{len(self._owned)} {processes}"]
-        shown += [f"{sum(self._live.values())}{of}{self._edges} {edges}"] if self._edges else []
-        return [*wrong, *shown, self._missing()]
+        parts = [f"{running}{of}{len(self._owned)} {processes}"]
+        parts += [f"{sum(self._live.values())}{of}{self._edges} {edges}"] if self._edges else []
+        return [*wrong, *parts, self._missing()]
 
     def _runs(self, name: str) -> bool:
         """Return whether the process runs.
 
-        A process started elsewhere counts as running when its edges are live.
+        A process that another program starts counts as running when its edges are live.
         """
         state = self._states.get(name)
         return state in ("running", "stopping") or (

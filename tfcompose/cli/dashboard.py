@@ -1,8 +1,8 @@
-"""Live view of ``up``: pages of lines for a terminal of any size, and the keys that change them.
+"""Live view of ``up``: pages of lines for a terminal of any size, and keys that change the pages.
 
-Its inputs are notices and answers of the launcher, the plan, usage of processes, and log lines.
-Lines are rich's texts, because these count wide characters as a terminal does. The tables are
-tfcompose's own. They drop columns, while rich would shorten numbers.
+The view shows notices and answers of the launcher, the plan, usage of processes, and log lines.
+Lines are rich's ``Text``, because rich counts wide characters as a terminal does. The tables are
+tfcompose's own: they drop columns on a narrow terminal, while rich would shorten numbers.
 """
 
 from __future__ import annotations
@@ -37,15 +37,16 @@ if TYPE_CHECKING:
 
 Page = Literal["processes", "log", "edges", "findings", "help"]
 
-#: The launcher's own log, and the key that shows it.
+#: The name of the launcher's log.
 LAUNCHER = "tfcompose"
-#: So much of a log, and of each of its lines, is kept; the files have all of it.
+#: Maximum number of log lines, of characters in a line, of findings and of events in memory. The
+#: log files are complete.
 KEPT_LINES = 5000
 LONGEST_LINE = 4000
 KEPT_FINDINGS = 500
 KEPT_EVENTS = 100
-#: The lower part of the first page takes a third of the rows where there is enough room, and at
-#: least so many.
+#: Minimum rows of the lower part of the first page. With enough rows, that part takes a third of
+#: them.
 NEWS_AT_LEAST = 4
 MARK = "▸"
 
@@ -69,7 +70,7 @@ A log that you scroll back stays there; End follows it again.
 In another terminal, tfcompose ps, logs, restart and doctor work as usual.
 tfcompose up --no-live prints lines instead of this view."""
 
-#: The keys of each page, those first that a narrow terminal must not lack.
+#: The keys of each page in order of importance. A narrow terminal shows only the first keys.
 _KEYS: dict[Page, str] = {
     "processes": "q end · ? help · l log · e edges · f findings · ↑↓ choose",
     "log": "Esc back · ? help · ↑↓ PgUp PgDn scroll · End follow · ←→ other process",
@@ -77,24 +78,24 @@ _KEYS: dict[Page, str] = {
     "findings": "Esc back · ? help · ↑↓ PgUp PgDn scroll · e edges",
     "help": "Esc back",
 }
-#: How lines of logs and events are coloured.
+#: Styles of lines in logs and events.
 _STYLES = (
     (re.compile(r"\b(?:ERROR|FATAL|CRITICAL)\b|^error\[|^Traceback "), "red"),
     (re.compile(r"\bWARN(?:ING)?\b|^warning\["), "yellow"),
     (re.compile(r"^(?:live|ready|over|tree complete)\b"), "green"),
 )
-#: Room before the table of processes for the mark and the key.
+#: Space before the table of processes for the mark and the key.
 _INDENT = "    "
 _EDGE_HEAD = ("EDGE", "OWNER", "KIND", "RATE", "STATE")
 
 
 @dataclass(frozen=True, slots=True)
 class _Reported:
-    """A finding or its end."""
+    """A report of a finding, or of the end of a finding."""
 
-    #: In seconds since 1970.
-    at: float
-    #: Coloured.
+    #: Time in seconds since 1970.
+    time_s: float
+    #: The report's lines, with colours.
     lines: tuple[Text, ...]
 
 
@@ -102,7 +103,7 @@ class _Reported:
 class _Scroll:
     """The visible part of a list."""
 
-    #: How many of its last lines are below the window.
+    #: Number of the list's last lines that are below the window.
     back: int = 0
     #: Height of the window in lines.
     room: int = 1
@@ -126,18 +127,19 @@ class Dashboard:
     #: The robot's name with its domain.
     name: str
     plan: Plan
-    #: The findings of the build, printed before the view; its first findings.
+    #: Findings of the build, which were printed before the view. The page of findings begins with
+    #: them.
     built_with: Sequence[Finding] = ()
-    #: Warnings printed before the view; its first events.
+    #: Warnings, which were printed before the view. The events begin with them.
     warnings: Sequence[str] = ()
     #: Returns seconds since 1970.
     clock: Callable[[], float] = time.time
     #: The launcher's last answer.
     status: RobotStatus | None = None
-    #: The last measured usage of processes.
+    #: The last measurement of the processes' usage.
     used: Usage = field(default_factory=dict)
     page: Page = "processes"
-    #: The process whose log to read for ``add_log_lines``; None: no log is shown.
+    #: The process whose lines ``add_log_lines`` expects, None if no log is visible.
     log_of: str | None = None
     stopping: str = ""
     ended: Ended | None = None
@@ -151,7 +153,8 @@ class Dashboard:
     _console: Console = field(init=False)
     _renderer: Renderer = field(init=False)
     _began: float = field(init=False)
-    _at: float = 0.0
+    #: The time of the event being shown, in seconds since 1970.
+    _event_s: float = 0.0
 
     def __post_init__(self) -> None:
         self._console = Console(self.plan, Nowhere(), colour=False, keep=self._keep)
@@ -161,21 +164,21 @@ class Dashboard:
         self._began = self.clock()
         self.forget()
 
-    # What happens.
+    # Input.
 
-    def take(self, notice: Notice, at: float) -> None:
-        """Take a notice and its time."""
-        self._at = at
+    def take(self, notice: Notice, time_s: float) -> None:
+        """Update the state from a notice and its time."""
+        self._event_s = time_s
         self._console(notice)
         if isinstance(notice, FindingShown):
             self._counts[notice.found.severity] += 1
             text = render_text(
                 [notice.found], line_of, colour=True, address_of=code_addresses(sys.stdout)
             )
-            self._reports.append(_Reported(at, tuple(map(Text.from_ansi, text.splitlines()))))
+            self._reports.append(_Reported(time_s, tuple(map(Text.from_ansi, text.splitlines()))))
         elif isinstance(notice, RecoveredShown):
             self._reports.append(
-                _Reported(at, (Text.assemble(("over", "green"), f"  {plain(notice.text)}"),))
+                _Reported(time_s, (Text.assemble(("over", "green"), f"  {plain(notice.text)}"),))
             )
         elif isinstance(notice, Stopping):
             self.stopping = plain(notice.reason)
@@ -183,7 +186,7 @@ class Dashboard:
             self.ended = notice
 
     def forget(self) -> None:
-        """Drop all notices: they will be sent again."""
+        """Delete all notices, because the launcher will send them again."""
         self._reports.clear()
         self._events.clear()
         self._events.extend(
@@ -194,7 +197,7 @@ class Dashboard:
             self.take(FindingShown(finding), self._began)
 
     def add_log_lines(self, lines: Iterable[str]) -> None:
-        """Add lines to the log; keep the position if it is scrolled back."""
+        """Add lines to the log. If the log is scrolled back, keep its position."""
         before = len(self._log)
         added = 0
         for line in lines:
@@ -205,7 +208,7 @@ class Dashboard:
             scroll.move(added)
 
     def press(self, key: str) -> bool:
-        """Handle a key; return whether to stop the robot."""
+        """Handle a key. Return whether to stop the robot."""
         confirmed, self._confirming = self._confirming and key == "q", False
         if confirmed:
             return True
@@ -244,7 +247,7 @@ class Dashboard:
         scroll.back = 1 << 30 if page in ("edges", "help") else 0
 
     def _show_log(self, number: int) -> None:
-        """Show the log of the process at that index, from 0; -1 is the launcher."""
+        """Show the log of the process with this index, from 0. The index -1 is the launcher."""
         names = [LAUNCHER, *(process.name for process in self._processes())]
         if number + 1 >= len(names) or number < -1:
             return
@@ -265,9 +268,9 @@ class Dashboard:
 
     def _keep(self, name: str, line: str) -> None:
         if name == LAUNCHER:
-            self._events.append((self._at, line))
+            self._events.append((self._event_s, line))
 
-    # What is shown.
+    # Output.
 
     def rows(self, columns: int, rows: int) -> list[str]:
         """Return the lines with their colours as control sequences."""
@@ -277,7 +280,7 @@ class Dashboard:
         return _LINK_ID.sub("\033]8;;", captured.get()).split("\n")
 
     def lines(self, columns: int, rows: int) -> list[Text]:
-        """Return as many lines as the terminal has, each at most as wide as it."""
+        """Return a line for each row of the terminal. No line is wider than the terminal."""
         columns, rows = max(columns, 20), max(rows, 3)
         body = {
             "processes": self._process_page,
@@ -287,11 +290,11 @@ class Dashboard:
             "help": self._help_page,
         }[self.page](columns, rows - 2)
         body = [*body[: rows - 2], *[Text()] * (rows - 2 - len(body))]
-        found = [self._head(columns), *body, self._foot()]
-        for line in found:
+        drawn = [self._head(columns), *body, self._foot()]
+        for line in drawn:
             line.no_wrap = True
             line.truncate(columns, overflow="ellipsis")
-        return found
+        return drawn
 
     def _head(self, columns: int) -> Text:
         head = Text(f"{MARK if self.page == 'log' else ' '} {self.name} ", style="bold")
@@ -334,7 +337,7 @@ class Dashboard:
         return Text("ready, edges silent" if self.status.ready else "not ready", style="yellow")
 
     def _live_edges(self) -> tuple[int, int]:
-        """Return how many edges the processes own, and how many of them are live."""
+        """Return the number of the processes' edges, and the number of live edges among these."""
         return sum(process.edges for process in self._processes()), sum(
             process.live for process in self._processes()
         )
@@ -351,48 +354,48 @@ class Dashboard:
         below = (
             max(min(NEWS_AT_LEAST, rows // 3), rows - len(processes) - 1) if processes else rows
         )
-        found = self._process_lines(columns, rows - below) if processes else []
+        shown_rows = self._process_lines(columns, rows - below) if processes else []
         if below > 1:
-            hidden = len(processes) - max(len(found) - 1, 0)
+            hidden = len(processes) - max(len(shown_rows) - 1, 0)
             title = (
                 "Findings (f shows them with help)" if self._reports else "Events (0 shows all)"
             )
             title = f"{hidden} more ↑↓ · {title}" if hidden else title
-            found.append(
+            shown_rows.append(
                 Text(
                     shorten(f"── {title} ".ljust(columns, "─"), columns, at_end=True),
                     style="dim",
                 )
             )
             news = self._news()
-            found += news[max(len(news) - below + 1, 0) :]
-        return found
+            shown_rows += news[max(len(news) - below + 1, 0) :]
+        return shown_rows
 
     def _process_lines(self, columns: int, rows: int) -> list[Text]:
-        """Return the table's head and the processes that fit, including the chosen one."""
+        """Return the table's head and the processes that fit, always with the selected process."""
         rows_of = [row(process, self.used) for process in self._processes()]
-        head, *shown = (
+        head, *process_rows = (
             Text.from_ansi(line)
             for line in TABLE.lines([HEAD, *rows_of], columns - len(_INDENT), coloured=True)
         )
         room = max(rows - 1, 1)
-        first = min(max(self._chosen - room // 2, 0), max(len(shown) - room, 0))
-        found = [Text(f"{_INDENT}{head.plain}", style="dim")]
-        for number, line in enumerate(shown[first : first + room], first):
+        first = min(max(self._chosen - room // 2, 0), max(len(process_rows) - room, 0))
+        texts = [Text(f"{_INDENT}{head.plain}", style="dim")]
+        for number, line in enumerate(process_rows[first : first + room], first):
             key = str(number + 1) if number < 9 else " "  # noqa: PLR2004 (keys of one digit)
             chosen = number == self._chosen
-            found.append(
+            texts.append(
                 Text(
                     f" {MARK if chosen else ' '}{key} ", style="bold" if chosen else "dim"
                 ).append_text(line)
             )
-        return found
+        return texts
 
     def _news(self) -> list[Text]:
-        """Return the first line of each report, or if there are none, the launcher's lines."""
+        """Return the first line of each report, or without reports the launcher's lines."""
         if self._reports:
-            return [self._with_time(report.at, report.lines[0]) for report in self._reports]
-        return [self._with_time(at, _style_line(line)) for at, line in self._events]
+            return [self._with_time(report.time_s, report.lines[0]) for report in self._reports]
+        return [self._with_time(time_s, _style_line(line)) for time_s, line in self._events]
 
     def _log_page(self, columns: int, rows: int) -> list[Text]:
         scroll = self._scroll("log")
@@ -402,14 +405,14 @@ class Dashboard:
         )
         lines = self._log
         window = scroll.window(len(lines), rows - 1)
-        found: list[Text] = []
-        for number in range(window.stop - 1, window.start - 1, -1):  # a line may take several rows
+        texts: list[Text] = []
+        for number in range(window.stop - 1, window.start - 1, -1):  # a line may fill several rows
             style = _style_of(lines[number])
             pieces = chop_cells(lines[number], columns) or [""]
-            found[:0] = [Text(piece, style=style) for piece in pieces]
-            if len(found) >= rows - 1:
+            texts[:0] = [Text(piece, style=style) for piece in pieces]
+            if len(texts) >= rows - 1:
                 break
-        return [title, *(found[len(found) - rows + 1 :] if len(found) >= rows else found)]
+        return [title, *(texts[len(texts) - rows + 1 :] if len(texts) >= rows else texts)]
 
     def _edge_page(self, columns: int, rows: int) -> list[Text]:
         missing = (
@@ -423,13 +426,13 @@ class Dashboard:
             if edge.name in missing:
                 state = "not live"
             table.append((edge.name, edge.owner, edge.kind, rate, state))
-        table.sort(key=lambda cells: cells[-1] == "live")  # what needs attention comes first
+        table.sort(key=lambda cells: cells[-1] == "live")  # edges that are not live come first
         if not table:
             return [Text(" this plan has no edges", style="dim")]
-        shown = Table(frozenset({3}), (3, 2), {0: 24, 1: 10}, _edge_colour).lines(
+        edge_lines = Table(frozenset({3}), (3, 2), {0: 24, 1: 10}, _edge_colour).lines(
             [_EDGE_HEAD, *table], columns - 1, coloured=True
         )
-        head, *lines = (Text(" ").append_text(Text.from_ansi(line)) for line in shown)
+        head, *lines = (Text(" ").append_text(Text.from_ansi(line)) for line in edge_lines)
         return [
             Text(head.plain, style="dim"),
             *lines[self._scroll("edges").window(len(lines), rows - 1)],
@@ -441,7 +444,7 @@ class Dashboard:
         lines: list[Text] = []
         for report in self._reports:
             first, *rest = report.lines
-            for line in (self._with_time(report.at, first), *rest):
+            for line in (self._with_time(report.time_s, first), *rest):
                 pieces = line.divide([len(piece) for piece in _ends(line.plain, columns - 1)])
                 lines += [Text(" ").append_text(piece) for piece in pieces if piece.plain]
         return lines[self._scroll("findings").window(len(lines), rows)]
@@ -452,18 +455,18 @@ class Dashboard:
         lines = [Text(f" {line}", style=styles.get(line, "")) for line in HELP.splitlines()]
         return lines[self._scroll("help").window(len(lines), rows)]
 
-    def _with_time(self, at: float, line: Text) -> Text:
-        today = time.localtime(self.clock())[:3] == time.localtime(at)[:3]
-        stamp = time.strftime("%H:%M:%S" if today else "%b %d %H:%M", time.localtime(at))
+    def _with_time(self, time_s: float, line: Text) -> Text:
+        today = time.localtime(self.clock())[:3] == time.localtime(time_s)[:3]
+        stamp = time.strftime("%H:%M:%S" if today else "%b %d %H:%M", time.localtime(time_s))
         return Text(f"{stamp} ", style="dim").append_text(line)
 
 
-#: rich gives each link another id in each drawing, with which all rows with links would differ.
+#: rich gives a link a new id in each drawing, so that every row with a link would differ.
 _LINK_ID = re.compile(r"\033\]8;id=[^;]*;")
 
 
 def _ends(text: str, width: int) -> Sequence[str]:
-    """Return the text up to the end of each row of that width, except the last one."""
+    """Return, for each row of that width except the last, the text up to the row's end."""
     pieces = chop_cells(text, max(width, 1))
     return ["".join(pieces[: number + 1]) for number in range(len(pieces) - 1)]
 

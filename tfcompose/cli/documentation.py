@@ -1,4 +1,4 @@
-"""Pages of topics and commands: Markdown in ``topics/``, and parts generated from the code."""
+"""Pages of topics and commands: Markdown in ``topics/``, and parts that the code generates."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.catalogue import Family
 
 FOLDER = Path(__file__).parents[1] / "data" / "topics"
-#: The topics of the core in groups, in the order of reading, with what their pages are about.
+#: The core's topics in groups, in reading order, with the subject of each page.
 TOPIC_GROUPS = {
     "Robot file": {
         "language": "the robot file, key by key",
@@ -53,13 +53,13 @@ _COMMENT = re.compile(r"^<!--.*?-->\n*", re.DOTALL | re.MULTILINE)
 
 
 def topics() -> dict[str, str]:
-    """Return the topics of the core and of installed tools, with their subjects."""
+    """Return the topics of the core and of installed tools, each with its subject."""
     of_tools = installed_tools().topics()
     return TOPICS | {name: topic.about for name, (_, topic) in of_tools.items()}
 
 
 def topic_groups() -> dict[str, dict[str, str]]:
-    """Return the topics of the core and of installed tools by their groups."""
+    """Return the topics of the core and of installed tools by group."""
     groups = {title: dict(names) for title, names in TOPIC_GROUPS.items()}
     reference = groups.popitem()
     for name, (_, topic) in installed_tools().topics().items():
@@ -68,9 +68,10 @@ def topic_groups() -> dict[str, dict[str, str]]:
 
 
 def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
-    """Return the page of a topic, the options and page of a command, or the meaning of a key.
+    """Return the page of a topic or a command, or the meaning of a key.
 
-    A topic named like a key ends with the key. None if there is nothing of that name.
+    The page of a command includes its options. If a topic and a key have the same name, the
+    topic's page ends with the key. Return None for an unknown name.
     """
     if name in commands:
         options, about = _options(name, commands[name]), text_of_command(name, commands[name])
@@ -82,9 +83,9 @@ def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
 
 
 def for_terminal(markdown: str, columns: int, *, coloured: bool = False) -> str:
-    """Return the page with tables and paragraphs that fit the columns, as text.
+    """Return the page as text, with tables and paragraphs that fit the columns.
 
-    ``coloured`` sets code in bold, and headings, as control sequences.
+    With ``coloured``, control sequences set code in bold and mark headings.
     """
     from io import StringIO
 
@@ -113,7 +114,7 @@ def for_terminal(markdown: str, columns: int, *, coloured: bool = False) -> str:
 def topic(name: str, *, with_reference: bool = True) -> str:
     """Return the page of a topic as Markdown, with its generated parts.
 
-    Without the reference, it omits all keys and all codes.
+    Without the reference, the page omits the lists of all keys and all codes.
     """
     tool, _ = installed_tools().topics().get(name, (None, None))
     text = _read(name, FOLDER if tool is None else tool.topic_folder)
@@ -122,20 +123,23 @@ def topic(name: str, *, with_reference: bool = True) -> str:
 
 
 def _options(name: str, command: CommandModule) -> str:
-    """Return the options of a command, including those of tools."""
+    """Return the help on the options of a command, including the options of tools."""
     parser = command_parser(name, command)
     add_all_options(name, parser)
     return parser.format_help()
 
 
 def text_of_command(name: str, command: CommandModule) -> str:
-    """Return a command's page as Markdown, empty if it has none; tools have their own pages."""
+    """Return a command's page as Markdown, empty without one.
+
+    A tool's pages are in its own folder.
+    """
     folder = command.tool.topic_folder if isinstance(command, ToolCommand) else FOLDER
     return _read(topic_of_command(name, command), folder)
 
 
 def topic_of_command(name: str, command: CommandModule) -> str:
-    """Return the name of a command's page: a topic, or a page for the command alone."""
+    """Return the name of a command's page: a topic, or the command's own name."""
     return (isinstance(command, ToolCommand) and command.command.topic) or name
 
 
@@ -151,9 +155,9 @@ def _keys() -> str:
 
 
 def code_table(family: Family | None = None) -> str:
-    """Return all codes, or those of a family, as a table in Markdown.
+    """Return all codes, or the codes of a family, as a Markdown table.
 
-    Its columns are code, name, severity, and the first sentence of the page.
+    The columns are code, name, severity, and the first sentence of the code's page.
     """
     from tfcompose.foundation.catalogue import CATALOGUE
 
@@ -176,6 +180,6 @@ def _vendors() -> str:
     return f"| vendor | models |\n|---|---|\n{rows}"
 
 
-#: What follows a topic's text.
+#: Functions that generate the text after a topic's page.
 _GENERATED: dict[str, Callable[[], str]] = {"presets": _vendors}
 _REFERENCES: dict[str, Callable[[], str]] = {"language": _keys, "codes": code_table}

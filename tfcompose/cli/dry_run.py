@@ -1,6 +1,6 @@
-"""``up --dry-run``: the processes of a plan, for review.
+"""``up --dry-run`` prints the processes of a plan for review.
 
-The same plan gives the same text everywhere.
+The text depends on nothing but the plan.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 
 def dry_run(arguments: Namespace) -> int:
-    """Print the processes of a robot or a built plan; exit code as for ``build``.
+    """Print the processes of a robot or a built plan. Return the exit code of ``build``.
 
-    Writes nothing.
+    The function writes no files.
     """
     if is_plan(arguments.file):
         file = Path(arguments.file)
@@ -111,7 +111,7 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
 
 
 def _what(process: PlanProcess) -> Iterator[str]:
-    """Yield the lines of processes and components."""
+    """Yield a line with the process's command, or with its component and container."""
     component = process.component
     if component:
         yield f"  loads    {component.package}/{component.plugin}, in {component.container}"
@@ -164,10 +164,10 @@ def _times(process: PlanProcess) -> Iterator[str]:
 
 
 def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
-    """Return the additions to the environment."""
+    """Return the variables that the process adds to the environment."""
     if process.kind in {"external", "component"}:
         return {}
-    env = child_environment({}, plan.ros, own=process.kind != "run") | process.env
+    env = child_environment({}, plan.ros, is_built_in=process.kind != "run") | process.env
     folder = str(FASTDDS_PROFILE.parent)
     return {name: value.replace(folder, "${tfcompose}/ros") for name, value in sorted(env.items())}
 

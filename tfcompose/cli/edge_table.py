@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.chain import FrameChain
     from tfcompose.tf.live.edges import EdgeState, TreeObserver
 
-#: A stamp with a larger difference counts as one of another clock.
+#: If stamp and current time differ by more, in seconds, they come from different clocks.
 _CLOCKS_AGREE_S = 1e6
 HEADS = ("edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay", "")
-#: A narrow terminal goes without kind (a row of a fixed edge has no numbers), jitter, gap, delay
-#: and age.
+#: On a narrow terminal, the table omits kind, jitter, gap, delay and age. The row of a fixed edge
+#: has no numbers, which shows its kind.
 TABLE = Table(
     right=frozenset(range(3, 8)),
     spare=(2, 4, 5, 7, 6),
@@ -38,7 +38,7 @@ def lines_of(
     *,
     coloured: bool = False,
 ) -> list[str]:
-    """Return a summary line and a table of edges and publishers, fitted to the width."""
+    """Return a summary line and a table of edges and publishers that fits the width."""
     contested = _several(edges)
     rows = [HEADS, *(_row(state, contested) for state in edges)]
     table = TABLE.lines(rows, width, coloured=coloured) if edges else []
@@ -46,7 +46,7 @@ def lines_of(
 
 
 def _several(edges: Sequence[EdgeState]) -> set[str]:
-    """Return the children with more than one publisher or more than one parent."""
+    """Return the children with several publishers or several parents."""
     counts = Counter(state.stream.child for state in edges if state.present is not False)
     return {child for child, number in counts.items() if number > 1}
 
@@ -69,7 +69,7 @@ def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) ->
 
 
 def not_kept(observer: TreeObserver) -> str:
-    """Return the number and publishers of transforms beyond the bounds, as text."""
+    """Return the number and the publishers of transforms beyond the memory limits, as text."""
     nodes = {
         node for gid in observer.beyond for node in observer.publishers.nodes(gid, static=False)
     }
@@ -110,7 +110,7 @@ def _row(state: EdgeState, contested: set[str]) -> tuple[str, ...]:
 
 
 def duration(seconds: float | None) -> str:
-    """Return milliseconds or seconds, with the significant digits."""
+    """Return a duration in milliseconds or seconds with significant digits only."""
     if seconds is None:
         return "–"
     if abs(seconds) > _CLOCKS_AGREE_S:
@@ -121,7 +121,7 @@ def duration(seconds: float | None) -> str:
 def chain_line(chain: FrameChain | str, a: str, b: str) -> str:
     """Return the number of edges between two frames and the age of the newest pose.
 
-    Without a chain, return the reason.
+    If there is no chain, return the reason.
     """
     ends = f"{printable(a)} → {printable(b)}"
     if isinstance(chain, str):
@@ -141,9 +141,9 @@ def objects_of(
     now_ns: int,
     chain: FrameChain | str | None = None,
 ) -> str:
-    """Return one line of JSON: counts and a list of edges.
+    """Return a line of JSON with counts and a list of edges.
 
-    Times in seconds, stamps in nanoseconds.
+    Times are in seconds, stamps in nanoseconds.
     """
     data: dict[str, Any] = {
         "time_ns": now_ns,
@@ -164,7 +164,7 @@ def objects_of(
 
 
 def object_of(state: EdgeState) -> dict[str, Any]:
-    """Return one edge as JSON; unknown values are null."""
+    """Return an edge as JSON data. Unknown values are null."""
     stream, timing = state.stream, state.timing
     return {
         "parent": stream.parent,

@@ -1,7 +1,7 @@
-"""``tfcompose lint --fix``: apply fixes that have one safe answer.
+"""``tfcompose lint --fix`` applies fixes that have a single safe answer.
 
-Edits are first tried in memory. An edit is kept only if it removes its finding and causes no new
-one.
+Each edit is first applied in memory. An edit is kept only if it removes its finding and causes no
+new finding.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NO_YAML = "TF002"
 
 
 class ChangedError(OSError):
-    """Raised when another program has changed the file since it was read."""
+    """Another program has changed the file since it was read."""
 
 
 @dataclass(slots=True)
@@ -40,11 +40,11 @@ class Fixer:
     """Fixes the named files."""
 
     files: Sequence[str]
-    #: Returns a file's findings, using the given reader.
+    #: Returns a file's findings. It reads files with the function in its argument.
     lint: Lint
-    #: The removed findings, with their former places.
+    #: The removed findings with their former places.
     fixed: list[Finding] = field(default_factory=list)
-    #: The files' new texts.
+    #: New text by file.
     texts: dict[str, str] = field(default_factory=dict)
     _read: dict[str, str] = field(default_factory=dict)
 
@@ -68,14 +68,14 @@ class Fixer:
         """Write the files that changed.
 
         Raises:
-            OSError: if one cannot be written, or was changed meanwhile; those before it are
-                written.
+            OSError: if a file cannot be written, or another program has changed it. The files
+                before it are already written.
         """
         for path, text in self.texts.items():
             rewrite(Path(path), self._read[path], text)
 
     def diff(self) -> Iterator[str]:
-        """Yield the unified diff of files that would change, under the names given."""
+        """Yield the unified differences of the files that would change."""
         names = {_path(file): file for file in self.files}
         for path, text in self.texts.items():
             before = self._read[path].splitlines(keepends=True)
@@ -84,7 +84,7 @@ class Fixer:
             )
 
     def read(self, file: str) -> str:
-        """Return the file's future text; a file is read once."""
+        """Return the file's future text. Each file is read from the disk only once."""
         path = _path(file)
         if path not in self._read:
             self._read[path] = read_text(file)
@@ -98,7 +98,10 @@ class Fixer:
         return [finding for file in files for finding in self.lint(file, self.read)]
 
     def _sound(self, file: str, kept: list[Finding], todo: list[Finding]) -> list[Finding]:
-        """Return ``kept`` and the fixes of ``todo`` that are sound with it, found by halving."""
+        """Return ``kept`` and those fixes of ``todo`` that are sound together with ``kept``.
+
+        If not all fixes are sound, the function halves ``todo`` and tries the parts.
+        """
         if not todo:
             return kept
         if self._is_sound(file, [*kept, *todo]):
@@ -109,7 +112,7 @@ class Fixer:
         return self._sound(file, self._sound(file, kept, todo[:half]), todo[half:])
 
     def _is_sound(self, file: str, fixed: list[Finding]) -> bool:
-        """Return whether these edits remove the findings and cause no others."""
+        """Return whether the edits remove the findings and cause no other findings."""
         files = dict.fromkeys(
             [file, *(edit.span.file for finding in fixed for edit in finding.edits)]
         )
@@ -121,7 +124,8 @@ class Fixer:
         self.texts = old
         come = after - before
         if any(finding.code == _NO_YAML for finding in fixed):
-            # What is found in a file that can be read now was there before.
+            # The file was not YAML before. Its other findings existed already, but were not
+            # detected.
             come = Counter({key: count for key, count in come.items() if key[0] == _NO_YAML})
         return not come and not _count_findings(fixed) - (before - after)
 
@@ -147,12 +151,12 @@ def _count_findings(findings: Iterable[Finding]) -> Counter[tuple[str, str]]:
 
 
 def rewrite(path: Path, old: str, new: str) -> None:
-    """Write the new text to the file, atomically.
+    """Replace the file's text atomically.
 
     Mode, owner and byte order mark stay.
 
     Raises:
-        OSError: if the file cannot be written; it is unchanged.
+        OSError: if the file cannot be written; the file is then unchanged.
     """
     if not os.access(path, os.W_OK):
         raise PermissionError(13, "Permission denied", str(path))

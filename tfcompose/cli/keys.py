@@ -1,10 +1,10 @@
-"""Keys of a terminal, by name."""
+"""Names of the keys of a terminal."""
 
 from __future__ import annotations
 
 import re
 
-#: Keys that send more than one byte, in the forms that terminals use.
+#: Keys by their byte sequences, in the forms of several terminals.
 _NAMED = {
     "A": "up",
     "B": "down",
@@ -38,21 +38,21 @@ class KeyDecoder:
 
     @property
     def waits(self) -> bool:
-        """Whether the input ends within a possible key.
+        """Whether the input ends inside a possible key.
 
-        If no more input follows within a moment, ``end`` returns the keys so far.
+        If no further input follows within a moment, call ``end`` for the keys so far.
         """
         return bool(self._rest)
 
     def feed(self, data: bytes) -> list[str]:
-        """Return the completed keys."""
+        """Add input, and return the keys that are complete."""
         text = self._rest + data.decode(errors="replace")
         begun = _BEGUN.search(text)
         self._rest = text[begun.start() :] if begun else ""
         return _keys(text[: len(text) - len(self._rest)])
 
     def end(self) -> list[str]:
-        """Return the keys in the input if no more input follows."""
+        """Return the remaining keys, because no more input follows."""
         text, self._rest = self._rest, ""
         return _keys(text)
 
@@ -62,5 +62,5 @@ def _keys(text: str) -> list[str]:
 
 
 def _key_name(sequence: str, char: str) -> str:
-    """Return the name of a key; empty for an escape sequence that no key sends."""
+    """Return the name of a key; empty if no key sends the escape sequence."""
     return _NAMED.get(sequence, "") if sequence else _NAMED.get(char, char)

@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.arguments import Combination
     from tfcompose.spec.load import Source
 
-#: For how long a file is judged in combinations of its arguments, in seconds; the first is always
-#: judged.
+#: Time limit in seconds for the combinations of a file's arguments. The first combination is
+#: always checked.
 JUDGE_FOR_S = 60.0
 
 
 class _LintFiles(NamedTuple):
-    """Files that a robot file may read, and variables that its arguments may read."""
+    """Access to the files of a robot file, and the environment variables for its arguments."""
 
     read: Callable[[str], str]
     presets: Library
-    #: For the file and its includes.
+    #: Returns the compiler's access to files, for a robot file and its includes.
     disk_of: Callable[[Source], Disk]
     environment_of: Callable[[Source], Mapping[str, str]]
     is_folder: Callable[[str], bool]
@@ -45,30 +45,36 @@ class Linter:
 
     arguments: Namespace
     presets: Library
-    #: The variables that arguments of untrusted robot files may read.
+    #: Environment variables that the arguments of untrusted robot files may read.
     environment: Mapping[str, str]
-    #: True: the command is about one file, so an argument that it lacks is an error.
+    #: Whether the command names a single file. Then an argument that the file does not declare is
+    #: an error.
     has_one_file: bool
+    #: Called with each folder of overlays before it is listed.
+    on_folder: Callable[[str], object] = lambda _: None
 
     def lint_robot(self, file: str, read: Callable[[str], str]) -> list[Finding]:
-        """Return the findings of a robot file, in the order of their places.
+        """Return the findings of a robot file, sorted by place.
 
-        It is checked alone and with each of its profiles, or with the requested ones, and alone in
-        each combination of its arguments' values.
+        The file is compiled for each combination of its arguments' values, with the requested
+        profiles. Without requested profiles and overlays, it is also compiled with each of its
+        profiles, and with each robot's overlay.
         """
         from tfcompose.cli.compiling import inputs_of, overlays_of
         from tfcompose.foundation.findings import RejectedError
-        from tfcompose.spec.language import with_includes
+        from tfcompose.spec.language import overlay_folder, with_includes
         from tfcompose.spec.load import load
 
         files = self._files_of(file, read)
         try:
             source = with_includes(load(files.read(file), file), files.read)
-            overlays = overlays_of(self.arguments, files.read, source)
+            if folder := overlay_folder(source):
+                self.on_folder(folder)
+            overlays = overlays_of(self.arguments, source, files.read)
         except RejectedError as error:
             return list(error.findings)
         inputs = replace(inputs_of(self.arguments), environment=files.environment_of(source))
-        if not self.has_one_file:  # an argument is one of any of the files
+        if not self.has_one_file:  # an argument may belong to another of the files
             names = inputs.args.keys() & source.mapping("args").keys()
             inputs = replace(inputs, args={name: inputs.args[name] for name in names})
         variants = _Variants(source, overlays, inputs, files, files.disk_of(source))
@@ -94,7 +100,7 @@ class Linter:
         return lint_urdf(file, packages, self.arguments.arg_values)
 
     def _files_of(self, file: str, read: Callable[[str], str]) -> _LintFiles:
-        """Return all files of this machine; with --untrusted, those of the robot's tree."""
+        """Return access to all files of this machine; with --untrusted, to the robot's tree."""
         if not self.arguments.untrusted:
             from tfcompose.cli.compiling import disk
 
@@ -116,7 +122,7 @@ class Linter:
 
 @dataclass(frozen=True, slots=True)
 class _Variants:
-    """A robot file in its variants by profiles and arguments."""
+    """A robot file with its variants: profiles, overlays and arguments."""
 
     source: Source
     overlays: Sequence[Source]
@@ -125,7 +131,7 @@ class _Variants:
     disk: Disk
 
     def in_combinations(self, profiles: Sequence[str]) -> tuple[list[Finding], list[Compiled]]:
-        """Return findings and compiled robots for each combination of argument values."""
+        """Return findings and compiled robots for all combinations of argument values."""
         if not self.source.has(("args",)) and not self.overlays:
             alone = self._compile(self.inputs, profiles)
             return list(alone.findings), [alone]
@@ -158,16 +164,16 @@ class _Variants:
     def with_each_variant(
         self, findings: Sequence[Finding], judged: Sequence[Compiled]
     ) -> list[Finding]:
-        """Return the findings that each profile and overlay of a robot adds.
+        """Return the additional findings of each profile, and of each robot's overlay.
 
-        Also unused allow comments.
+        The result also includes findings about unused allow comments.
         """
         from tfcompose.compiler.check import unused_allows
         from tfcompose.foundation.findings import RejectedError
         from tfcompose.spec.language import overlay_files
 
-        known = {_identity(finding) for finding in findings}
-        # A profile that lays over another key of an entry moves the place of what was found there.
+        identities = {_identity(finding) for finding in findings}
+        # A profile can move a finding to another place by changing another key of the entry.
         messages = {_judgement(finding) for finding in findings} - {None}
         more: list[Finding] = []
         variants = list(judged)
@@ -181,21 +187,22 @@ class _Variants:
             new = [
                 finding
                 for finding in variant.findings
-                if _identity(finding) not in known and _judgement(finding) not in messages
+                if _identity(finding) not in identities and _judgement(finding) not in messages
             ]
             more += [replace(finding, notes=(*finding.notes, note)) for finding in new]
-            known |= {_identity(finding) for finding in new}
+            identities |= {_identity(finding) for finding in new}
             messages |= {_judgement(finding) for finding in new} - {None}
         if all(variant.robot is not None for variant in variants):
-            # Otherwise a comment may be about what was not judged.
+            # If a variant did not compile, a comment may be about a finding that was not detected.
             used = {pair for variant in variants for pair in variant.used}
             more += unused_allows(self.source.allows, used)
         return more
 
     def _each_variant(self, files: Sequence[str]) -> Iterator[tuple[str, Compiled]]:
-        """Yield the robot with each profile, then with each robot's overlay, by its option.
+        """Yield the robot with each profile, then with each robot's overlay.
 
-        ``files`` are the names in the folder of the overlays.
+        The first item is the option that selects the variant. ``files`` are the names in the
+        folder of the overlays.
         """
         from tfcompose.compiler.compile import Compiled
         from tfcompose.foundation.findings import RejectedError
@@ -233,7 +240,10 @@ class _Variants:
 
 
 def merge_findings(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Finding]:
-    """Return each finding once, with a note if only some combinations have it."""
+    """Return each finding once.
+
+    A note names the combinations if only some of them have the finding.
+    """
     where: dict[_Identity, list[int]] = {}
     firsts: dict[_Identity, Finding] = {}
     for index, (_, findings) in enumerate(judged):
@@ -251,7 +261,7 @@ def merge_findings(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> l
 
 
 def _name_combinations(every: Sequence[Combination], where: Sequence[int]) -> str:
-    """Return the combinations that have something, described by the fewest arguments."""
+    """Return a description of the combinations in ``where`` with the fewest arguments."""
     inside = set(where)
     first = every[where[0]]
     best, covered = dict(first), 1
@@ -265,12 +275,16 @@ def _name_combinations(every: Sequence[Combination], where: Sequence[int]) -> st
             if matching <= inside and len(matching) >= covered:
                 best, covered = {name: first[name] for name in names}, len(matching)
     settings = " ".join(f"{name}:={value}" for name, value in best.items())
-    others = len(inside) - covered
-    more = f", and in {others} other combination{'s' * (others > 1)} of args" if others else ""
+    uncovered = len(inside) - covered
+    more = (
+        f", and in {uncovered} other combination{'s' * (uncovered > 1)} of args"
+        if uncovered
+        else ""
+    )
     return f"with {settings}{more}"
 
 
-#: What makes findings of several variants the same one: code, message and place.
+#: Findings of several variants are the same if code, message and place are equal.
 _Identity = tuple[str, str, "Span | None"]
 
 
@@ -279,5 +293,5 @@ def _identity(finding: Finding) -> _Identity:
 
 
 def _judgement(finding: Finding) -> tuple[str, str] | None:
-    """Return a key for findings of rules about the robot; None for those about text and keys."""
+    """Return a key for a finding about the robot, None for a finding about text or keys."""
     return (finding.code, finding.message) if finding.code >= "TF2" else None

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from datetime import date
 
+    from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import Plan
     from tfcompose.tf.live.feed import Feed
 
@@ -34,15 +35,15 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Publishers that were there before are found within this time, or almost always.
+#: Time in seconds within which almost all existing publishers are discovered.
 SURE_S = 2.0
 
 
 def refuse_live_bag(arguments: Namespace) -> None:
-    """Refuse --live together with --bag.
+    """Reject --live together with --bag.
 
     Raises:
-        SystemExit: after reporting it.
+        SystemExit: after an error message, if both are used.
     """
     if arguments.live and arguments.bag:
         fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
@@ -51,10 +52,11 @@ def refuse_live_bag(arguments: Namespace) -> None:
 def observe_for(name: str, arguments: Namespace) -> tuple[Plan | None, dict[Topics, TreeObserver]]:
     """Return the plan of FILE, if given, and the observation of the topics (moving, fixed).
 
-    The topics are the plan's, or those of --namespace. ``name`` is the observing node's name.
+    The topics come from the plan or from --namespace. ``name`` is the name of the observing node.
 
     Raises:
-        SystemExit: after reporting unreadable input, a failed observation or conflicting options.
+        SystemExit: after an error message about unreadable input, a failed observation or
+            conflicting options.
     """
     refuse_live_bag(arguments)
     plan = None
@@ -71,23 +73,30 @@ def from_bag(read: Callable[[], T]) -> T:
     """Return the observation of a bag.
 
     Raises:
-        SystemExit: after reporting why it cannot be read.
+        SystemExit: after an error message, if the bag cannot be read.
     """
-    missing = missing_rosbags()
-    if missing:
-        message, _, help_ = missing.partition(": ")
-        reject([finding("TF906", message, None, help=help_)])
+    if missing := no_rosbags():
+        reject([missing])
     try:
         return read()
     except BagError as error:
         reject([finding("TF907", str(error), None, help=error.help)], UNREADABLE)
 
 
+def no_rosbags() -> Finding | None:
+    """Return the finding that bags cannot be read here, with what to install, or None."""
+    missing = missing_rosbags()
+    if not missing:
+        return None
+    message, _, advice = missing.partition(": ")
+    return finding("TF906", message, None, help=advice)
+
+
 def recording_day(bag: str | None) -> date | None:
-    """Return the day, in UTC, on which the recording of a bag began; None without one.
+    """Return the day (UTC) on which the recording of a bag began, None without a bag.
 
     Raises:
-        SystemExit: after reporting why the bag cannot be read.
+        SystemExit: after an error message, if the bag cannot be read.
     """
     return None if bag is None else from_bag(lambda: Recording(bag).first_day())
 
@@ -102,7 +111,7 @@ def observe_topics(  # noqa: PLR0913 (all but two are named)
     may_be_silent: bool = False,
     joint_topics: Iterable[str] = (),
 ) -> dict[Topics, TreeObserver]:
-    """Return the observations of pairs of topics (moving, fixed), as ``observe`` does."""
+    """Return the observations of pairs of topics (moving, fixed). See ``observe``."""
     settle_s = 0.0 if bag else SETTLE_S
     observers = {pair: TreeObserver(settle_s=settle_s) for pair in pairs}
     observe(
@@ -131,11 +140,12 @@ def observe(  # noqa: PLR0913 (all but two are named)
 ) -> None:
     """Fill the observers from a bag, or else from the running system.
 
-    It ends after ``duration_s`` seconds or with a signal. Calls ``show`` every ``every_s``
-    seconds; observes the senders of joint states on the ``joint_topics``.
+    The observation ends after ``duration_s`` seconds or with a signal. It calls ``show`` every
+    ``every_s`` seconds. It also observes the senders of joint states on the ``joint_topics``.
 
     Raises:
-        SystemExit: after reporting the reason. Silence is one, unless it ``may_be_silent``.
+        SystemExit: after an error message. Silence is also an error, except with
+            ``may_be_silent``.
     """
     if bag:
         from_bag(lambda: follow(BagFeed(bag, observers), Stop()))
@@ -154,7 +164,7 @@ def observe(  # noqa: PLR0913 (all but two are named)
         if stop.requested:
             check_early_end(seconds, duration_s, heard=heard)
     if not heard and not may_be_silent:
-        _reject_silence(list(observers), seconds, elsewhere)
+        reject_silence(list(observers), seconds, elsewhere)
 
 
 def _live_feed(
@@ -163,25 +173,25 @@ def _live_feed(
     ros: RosSettings | None,
     joint_topics: Iterable[str],
 ) -> Feed:
-    """Return the feed for this process, set up as the plan says."""
+    """Return the feed of live messages, after setting this process up as the plan requires."""
     if set_up_ros(ros, zenoh_alone=True):
         from tfcompose.tf.live.zenoh_feed import ZenohFeed
 
         return ZenohFeed(observers)
-    from tfcompose.tf.live.ros_feed import RosFeed  # rclpy reads the environment when loaded
+    from tfcompose.tf.live.ros_feed import RosFeed  # its import reads the environment
 
     return RosFeed(name, observers, joint_topics)
 
 
 def set_up_ros(ros: RosSettings | None = None, *, zenoh_alone: bool = False) -> bool:
-    """Set this process up as the plan says.
+    """Set this process up as the plan requires.
 
-    Return whether to read TF from Zenoh without ROS; only if ``zenoh_alone`` allows it.
+    Return whether to read TF from Zenoh without ROS. This is False unless ``zenoh_alone`` is True.
 
     Raises:
-        SystemExit: after reporting why ROS cannot start with these settings.
+        SystemExit: after an error message, if ROS cannot start with these settings.
     """
-    os.environ.update(child_environment(os.environ, ros or RosSettings(), own=True))
+    os.environ.update(child_environment(os.environ, ros or RosSettings(), is_built_in=True))
     if zenoh_alone and reads_zenoh_alone(os.environ):
         return True
     trouble = ros_trouble(os.environ, ros)
@@ -191,12 +201,12 @@ def set_up_ros(ros: RosSettings | None = None, *, zenoh_alone: bool = False) -> 
 
 
 def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) -> None:
-    """Report that a signal ended an observation before all publishers could be discovered.
+    """Warn if a signal ended an observation before all publishers could be discovered.
 
-    ``duration_s`` is its planned duration; None: until the signal.
+    ``duration_s`` is the planned duration, None for an observation until a signal.
 
     Raises:
-        SystemExit: if it received nothing.
+        SystemExit: after an error message, if no message arrived.
     """
     if seconds >= min(SURE_S, duration_s or SURE_S):
         return
@@ -214,8 +224,12 @@ def _reject_silent_bag(bag: str, topics: Sequence[Topics]) -> None:
     reject([finding("TF811", message, None, help=help_)])
 
 
-def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:
-    """Report that there was no TF."""
+def reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:
+    """Report that no TF message arrived.
+
+    Raises:
+        SystemExit: always.
+    """
     message = f"no TF message arrived on {names_of(topics)} in {seconds:.1f} s"
     notes = [Note(f"settings: {settings_text(os.environ)}")]
     reject([finding("TF811", message, None, notes=notes, help=elsewhere_help(elsewhere))])

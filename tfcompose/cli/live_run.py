@@ -1,7 +1,7 @@
-"""``up`` on a terminal: the launcher runs in a child process, and this process shows it.
+"""``up`` on a terminal: the launcher runs in a child process, and this process shows the state.
 
-A slow terminal therefore never delays the robot, Ctrl-Z stops only the view, and an error in the
-view ends only the view. The launcher ends with this process, whatever ends it.
+Therefore a slow terminal never delays the robot, Ctrl-Z stops only the view, and an error in the
+view ends only the view. When this process ends for any reason, the launcher ends, too.
 """
 
 from __future__ import annotations
@@ -47,18 +47,18 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import Notice, Request
     from tfcompose.model.plan import Plan
 
-#: How often the launcher is asked for its state, at least and at most; what processes use is
-#: measured more rarely.
+#: Intervals in seconds: the longest and the shortest between two requests for the launcher's
+#: state, and between measurements of the processes' usage.
 STATUS_EVERY_S, STATUS_AT_MOST_EVERY_S, USAGE_EVERY_S = 1.0, 0.2, 5.0
-#: What changes is drawn at most so often; after a key at once.
+#: Minimum time between drawings in seconds. After a key, the view draws at once.
 DRAW_EVERY_S = 0.2
-#: How often the log that is shown is read.
+#: Interval between reads of the visible log, in seconds.
 LOG_EVERY_S = 0.25
-#: So much of a log is read when it is opened; bytes.
+#: Number of bytes at the end of a log that are read first.
 LOG_BYTES = 512 * 1024
-#: After so long an Esc was the key itself, and not the begin of another one; seconds.
+#: Time in seconds after which an Esc is the Esc key, not the beginning of another key.
 ESCAPE_S = 0.05
-#: So many findings are printed again when the view is left.
+#: Maximum number of findings that are printed again when the view ends.
 PRINTED_AT_MOST = 20
 
 
@@ -82,14 +82,15 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
 ) -> int:
     """Show the run until its launcher, a child of this process, has ended; return its exit code.
 
-    Ending signals are forwarded to the launcher. They are blocked so far, and ``mask`` is the mask
-    from before that. The findings of the build and ``warnings`` were already printed, and the view
-    hides them. They are its first findings and events.
+    This process forwards signals that end a program to the launcher. These signals are still
+    blocked, and ``mask`` is the signal mask from before. ``built_with`` (findings of the build)
+    and ``warnings`` were already printed. The view shows them again, because it covers the earlier
+    output.
     """
     with Signals(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         from tfcompose.cli.dashboard import (
-            Dashboard,  # rich takes a moment to load, and signals none
+            Dashboard,  # importing rich is slow; meanwhile, Signals records signals
         )
         from tfcompose.cli.screen import Screen
 
@@ -105,10 +106,10 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
 
 
 class _LauncherConnection:
-    """A connection to the launcher, read line by line without blocking."""
+    """A connection to the launcher that reads lines without blocking."""
 
     def __init__(self, runtime_dir: RuntimeDir) -> None:
-        """Connect, or raise OSError."""
+        """Connect. Raises OSError."""
         self._socket = connect(runtime_dir)
         self._socket.setblocking(False)  # noqa: FBT003 (its only argument)
         self._rest = b""
@@ -117,27 +118,27 @@ class _LauncherConnection:
         return self._socket.fileno()
 
     def send(self, request: Request) -> None:
-        """Send a request; raises OSError."""
+        """Send a request. Raises OSError."""
         self._socket.sendall(line_of(request))
 
     def lines(self) -> list[bytes]:
         """Return the received lines.
 
         Raises:
-            OSError: if the launcher has hung up.
+            OSError: if the launcher has closed the connection.
         """
-        found: list[bytes] = []
+        collected: list[bytes] = []
         while True:
             try:
                 data = self._socket.recv(64 * 1024)
             except BlockingIOError:
-                return found
+                return collected
             if not data:
-                if found:
-                    return found
+                if collected:
+                    return collected
                 raise ConnectionResetError
             *lines, self._rest = (self._rest + data).split(b"\n")
-            found += lines
+            collected += lines
 
     def close(self) -> None:
         self._socket.close()
@@ -213,7 +214,7 @@ class _LiveView:
         if not any(isinstance(notice, Ended) for notice in self._last):
             warn(f"the launcher has ended; see {self._runtime_dir.logs / 'launcher.err'}")
 
-    # What comes.
+    # Input.
 
     def _connect(self) -> None:
         if (
@@ -244,8 +245,8 @@ class _LiveView:
             self._events = None
             return
         for line in lines:
-            notice, at = read_notice(line)
-            self._dashboard.take(notice, at)
+            notice, time_s = read_notice(line)
+            self._dashboard.take(notice, time_s)
             self._stale = True
             self._status_at = min(self._status_at, self._requested_at + STATUS_AT_MOST_EVERY_S)
             if isinstance(notice, (FindingShown, RecoveredShown, Stopping, Ended)):
@@ -277,7 +278,7 @@ class _LiveView:
             data = os.read(self._screen.fd, 1024)
         except OSError:
             data = b""
-        if not data:  # the terminal has gone
+        if not data:  # the terminal is gone
             self._selector.unregister(self._screen.fd)
             self._pass_on(signal.SIGHUP)
             return
@@ -287,15 +288,15 @@ class _LiveView:
         for key in keys:
             if key == "redraw":
                 self._screen.redraw()
-            shown = self._dashboard.log_of
+            process = self._dashboard.log_of
             if self._dashboard.press(key):
                 self._pass_on(signal.SIGINT)
-            if self._dashboard.log_of != shown:
+            if self._dashboard.log_of != process:
                 self._follow_log(self._dashboard.log_of)
         self._stale, self._draw_at = True, 0.0
 
     def _follow_log(self, name: str | None) -> None:
-        """Read the process's log from the start of this run; None: stop reading."""
+        """Read the process's log from the start of this run. None stops the reading."""
         folder = self._runtime_dir.logs
         since_s = max(runs_of(folder), default=0.0)
         self._follower = (
@@ -318,7 +319,7 @@ class _LiveView:
         if self._code is None:
             os.kill(self._launcher, number)
 
-    # What is done now and then.
+    # Periodic work.
 
     def _sleep_s(self) -> float:
         due = [self._status_at, self._usage_at]
@@ -372,7 +373,7 @@ class _LiveView:
             warn(f"the live view failed: {self._fault}; the robot runs on, and Ctrl-C stops it")
 
     def _wait_for_terminal(self) -> None:
-        """Wake up when the terminal takes more, while output is pending."""
+        """While output is pending, wake up when the terminal accepts more."""
         output = self._screen.output
         if output.owes == self._owing:
             return

@@ -29,10 +29,17 @@ def add_file(parser: ArgumentParser) -> None:
     )
 
 
-def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> None:
-    """Add the options that are merged over a robot file: --profile, --overlay, --set, args.
+def add_variant(
+    parser: ArgumentParser,
+    text: str = "apply this profile",
+    robot: str = "none",
+    *,
+    by_hostname: bool = False,
+) -> None:
+    """Add the options that change a robot file: --profile, --robot, --overlay, --set, arguments.
 
-    Call it after FILE is added, if that is a positional argument.
+    If FILE is a positional argument, add FILE before. ``robot`` describes the default of --robot.
+    With ``by_hostname`` this default is the overlay of this computer, if there is one.
     """
     parser.add_argument(
         "-p",
@@ -43,6 +50,13 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         dest="profiles",
         help=f"{text}; repeatable",
     )
+    parser.add_argument(
+        "--robot",
+        metavar="NAME",
+        dest="overlay_robot",
+        help=f"merge NAME.yaml from the folder under overlays:; default: {robot}",
+    )
+    parser.set_defaults(by_hostname=by_hostname)
     parser.add_argument(
         "-f",
         "--overlay",
@@ -73,24 +87,19 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
     add_trust(parser)
 
 
-def add_robot_overlay(
-    parser: ArgumentParser, default: str = "", *, by_hostname: bool = False
-) -> None:
-    """Add --robot, which names the overlay of a robot.
-
-    With ``by_hostname`` the default is the overlay of this computer, if it has one.
-    """
-    parser.add_argument(
-        "--robot",
-        metavar="NAME",
-        dest="overlay_robot",
-        help=f"merge NAME.yaml from the folder under overlays:; default: {default or 'none'}",
+def changes_robot(arguments: Namespace) -> bool:
+    """Return whether an option of ``add_variant`` changes the robot file."""
+    return bool(
+        arguments.profiles
+        or arguments.overlay_robot is not None
+        or arguments.overlays
+        or arguments.settings
+        or arguments.arg_values
     )
-    parser.set_defaults(by_hostname=by_hostname)
 
 
 def add_ros_args(parser: ArgumentParser) -> None:
-    """Add --ros-args, with the rest of the command line or the part before ``--``."""
+    """Add --ros-args. It takes the rest of the command line, or the part before ``--``."""
     parser.add_argument(
         "--ros-args",
         nargs=1,
@@ -111,10 +120,10 @@ def add_trust(parser: ArgumentParser) -> None:
 
 
 def pairs(arguments: list[str], between: str) -> dict[str, str]:
-    """Return arguments such as NAME:=VALUE, or NAME=VALUE, by name.
+    """Return arguments of the form NAME:=VALUE, or NAME=VALUE, as values by name.
 
     Raises:
-        SystemExit: after reporting one of another form.
+        SystemExit: after an error message, if an argument has another form.
     """
     wrong = next(
         (
@@ -147,7 +156,7 @@ def add_robot(
 
 
 def add_processes(parser: ArgumentParser) -> None:
-    """Add NAME …, the processes of a running robot, and --robot."""
+    """Add NAME (names of processes of a running robot) and --robot."""
     parser.add_argument(
         "name", nargs="+", metavar="NAME", help="a process, as listed by tfcompose ps"
     )
@@ -166,7 +175,7 @@ def add_bag(
     parser.add_argument("--bag", metavar="BAG", help=f"{text}: a rosbag2 folder, .mcap or .db3")
 
 
-#: How far a pose may be off.
+#: The default tolerance of a pose.
 TOLERANCE = "1mm,0.1deg"
 
 
@@ -185,7 +194,7 @@ def tolerance(text: str) -> Offset:
     """Parse a distance, an angle, or both.
 
     Raises:
-        ArgumentTypeError: if it is neither.
+        ArgumentTypeError: if the text is neither.
     """
     from tfcompose.foundation.geometry import Offset
     from tfcompose.guard.verdict.publishers import SAME_POSE
@@ -202,15 +211,15 @@ def tolerance(text: str) -> Offset:
 def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> None:
     """Add --for."""
     parser.add_argument(
-        "--for", dest="duration", type=positive, default=default, metavar="S", help=text
+        "--for", dest="duration", type=duration, default=default, metavar="S", help=text
     )
 
 
 def settle_duration(arguments: Namespace, default_s: float, *, is_live: bool) -> None:
-    """Set the default of --for; refuse it without a running tree, as with a recording.
+    """Set the default of --for. Without a running tree, as with a recording, reject --for.
 
     Raises:
-        SystemExit: after reporting that.
+        SystemExit: after an error message, if --for is rejected.
     """
     if arguments.duration is not None and arguments.bag:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
@@ -222,20 +231,20 @@ def settle_duration(arguments: Namespace, default_s: float, *, is_live: bool) ->
     arguments.duration = arguments.duration or default_s
 
 
-def add_format(parser: ArgumentParser, *others: str, text: str = "default: text") -> None:
-    """Add --format: text or one of the others, by default json."""
+def add_format(parser: ArgumentParser, *choices: str, text: str = "default: text") -> None:
+    """Add --format with the choices text and ``others``. The default of ``others`` is json."""
     parser.add_argument(
-        "--format", choices=("text", *(others or ("json",))), default="text", help=text
+        "--format", choices=("text", *(choices or ("json",))), default="text", help=text
     )
 
 
 def namespace(text: str) -> str:
-    """Parse a ROS namespace, and return it without leading and trailing slashes.
+    """Parse a ROS namespace. Return it without leading and trailing slashes.
 
-    Empty for the global one.
+    The result is empty for the global namespace.
 
     Raises:
-        ArgumentTypeError: if it is not a valid namespace.
+        ArgumentTypeError: if the text is not a valid namespace.
     """
     name = text.strip("/")
     if name in TF_TOPICS or name.endswith(tuple(f"/{topic}" for topic in TF_TOPICS)):
@@ -251,7 +260,7 @@ def positive(text: str) -> float:
     """Parse a positive number.
 
     Raises:
-        ArgumentTypeError: if it is not one.
+        ArgumentTypeError: if the text is not a positive number.
     """
     value = _number(text)
     if value is None or value == 0:
@@ -259,11 +268,28 @@ def positive(text: str) -> float:
     return value
 
 
+def duration(text: str) -> float:
+    """Parse a positive duration in seconds. A unit may follow: ``30``, ``30 s``, ``2 min``.
+
+    Raises:
+        ArgumentTypeError: if the text is not a positive duration.
+    """
+    from tfcompose.foundation.units import NUMBER, TIME, UnitError, quantity
+
+    try:
+        value = quantity(text, TIME)
+    except UnitError as error:
+        raise ArgumentTypeError(str(error)) from None
+    if value.dimension not in {NUMBER, TIME}:
+        raise ArgumentTypeError(f"{text} is not a duration, such as 30 s")
+    return positive(str(value.value))
+
+
 def not_negative(text: str) -> float:
     """Parse a number that is 0 or more.
 
     Raises:
-        ArgumentTypeError: if it is not one.
+        ArgumentTypeError: if the text is not such a number.
     """
     value = _number(text)
     if value is None:
@@ -272,10 +298,10 @@ def not_negative(text: str) -> float:
 
 
 def count(text: str) -> int:
-    """Parse an integer of 0 or more.
+    """Parse an integer that is 0 or more.
 
     Raises:
-        ArgumentTypeError: if it is not one.
+        ArgumentTypeError: if the text is not such an integer.
     """
     if not text.isascii() or not text.isdigit() or len(text) > 9:  # noqa: PLR2004 (a billion lines)
         raise ArgumentTypeError(f"{text} is not a whole number of 0 or more")

@@ -1,7 +1,7 @@
-"""The command ``tfcompose``: the commands of the core, parsing of options, and the exit code.
+"""The command ``tfcompose``: commands of the core, parsing of options, and the exit code.
 
-The parser loads the modules of the core's commands, so these import little at the top; a command
-imports what it needs when it runs. Other commands are looked up in ``tool_commands``.
+The parser imports the modules of all core commands. So these modules import little at the top, and
+a command imports further modules when it runs. ``tool_commands`` finds other commands.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from typing import TextIO
 
 
-#: The commands of the core by what they are for, in the order of the help.
+#: The core's commands grouped by purpose, in the order of the help.
 GROUPS: dict[str, dict[str, CommandModule]] = {
     "Write": {"init": init, "presets": presets, "schema": schema},
     "Check": {
@@ -83,7 +83,7 @@ COMMANDS: dict[str, CommandModule] = {
 
 
 def all_groups() -> dict[str, dict[str, CommandModule]]:
-    """Return the commands of the core and of all installed tools, by group."""
+    """Return the commands of the core and of all installed tools by group."""
     groups = {title: dict(commands) for title, commands in GROUPS.items()}
     helps = groups.pop("Help")
     for tool_command in tool_commands.all_commands():
@@ -93,19 +93,19 @@ def all_groups() -> dict[str, dict[str, CommandModule]]:
 
 
 def all_commands() -> dict[str, CommandModule]:
-    """Return the commands of the core and of all installed tools, by name."""
+    """Return the commands of the core and of all installed tools by name."""
     return {name: command for group in all_groups().values() for name, command in group.items()}
 
 
 def find_command(name: str) -> CommandModule | None:
-    """Return a command of the core, or else of a tool; None if neither has it."""
+    """Return a command of the core, or else of a tool; None if there is no such command."""
     return COMMANDS.get(name) or tool_commands.find(name)
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line and return the exit code.
 
-    0 clean, 1 findings or a failed process, 2 wrong use.
+    The code is 0 without problems, 1 for findings or a failed process, 2 for wrong use.
     """
     _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
@@ -132,7 +132,7 @@ def main(argv: list[str] | None = None) -> int:
     return code
 
 
-#: What the disk says of a path that somebody named: no command is at fault.
+#: Errors of the operating system about a path from the user. The command is not at fault.
 _OF_A_PATH = frozenset(
     {errno.EACCES, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EROFS}
 )
@@ -147,7 +147,7 @@ def _refuse_path(error: OSError) -> int:
 
 
 def _main(argv: list[str]) -> int:
-    if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion, which runs the program
+    if "_ARGCOMPLETE" in os.environ:  # the shell's completion sets this
         from tfcompose.cli.completing import complete
 
         complete(all_commands())
@@ -163,12 +163,12 @@ def _main(argv: list[str]) -> int:
 
 
 def _run(name: str, command: CommandModule, argv: list[str]) -> int:
-    gc.set_threshold(200_000, 50, 1000)  # a large build makes much, and little of it is garbage
+    gc.set_threshold(200_000, 50, 1000)  # a large build creates many objects and little garbage
     with RememberedInterrupt():
         try:
             code = _run_command(name, command, argv)
         except BaseException:
-            # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load.
+            # During imports, Python and pydantic's Rust code turn a Ctrl-C into other errors.
             if take_interrupt():
                 return INTERRUPTED
             raise
@@ -178,14 +178,12 @@ def _run(name: str, command: CommandModule, argv: list[str]) -> int:
 def _run_command(name: str, command: CommandModule, argv: list[str]) -> int:
     try:
         parser = command_parser(name, command)
-        if not {"-h", "--help"}.isdisjoint(
-            argv
-        ):  # argparse would say nothing of a reader that is gone
+        if not {"-h", "--help"}.isdisjoint(argv):  # argparse would ignore that the reader is gone
             tool_commands.add_all_options(name, parser)
             sys.stdout.write(parser.format_help())
             return 0
         options = tool_commands.add_options(name, parser, argv)
-        parser.set_defaults(commands=all_commands)  # for commands that are about commands
+        parser.set_defaults(commands=all_commands)  # for commands that describe other commands
         arguments = parser.parse_args(argv)
         if getattr(arguments, "show_args", False):
             from tfcompose.cli.args import show_args
@@ -196,14 +194,14 @@ def _run_command(name: str, command: CommandModule, argv: list[str]) -> int:
             if code is not None:
                 return code
         return command.run(arguments)
-    except SystemExit as end:  # after a complaint
+    except SystemExit as end:  # after an error message
         return end.code if isinstance(end.code, int) else UNREADABLE
 
 
 def parser_of(name: str, columns: int = 0) -> Parser:
-    """Return the parser of one command, with the options that tools add to it.
+    """Return the parser of a command, with the options that tools add to the command.
 
-    Its help is ``columns`` wide, by default as the terminal.
+    The help is ``columns`` wide. The default is the terminal's width.
 
     Raises:
         KeyError: if there is no such command.
@@ -268,9 +266,9 @@ def _unknown(command: str) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Replace streams that were closed at the start (``>&-``), where Python has None.
+    """Replace standard streams that were closed at the start (``>&-``).
 
-    The replacements discard everything.
+    Python represents a closed stream by None. The replacement discards all output.
     """
     for fd, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         if getattr(sys, name) is not None:
@@ -283,14 +281,14 @@ def _open_closed_streams() -> None:
 
 
 def _escape_what_cannot_be_encoded(stream: TextIO) -> None:
-    """Print characters that a stream cannot encode as escapes instead of raising."""
+    """Make the stream print escapes for characters that it cannot encode, instead of raising."""
     reconfigure = getattr(stream, "reconfigure", None)
     if reconfigure:
         reconfigure(errors="backslashreplace")
 
 
 def _discard_output() -> None:
-    """Discard buffered output for a closed reader, without a traceback."""
+    """Discard buffered output, without a traceback, because the reader is gone."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

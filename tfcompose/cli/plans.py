@@ -1,4 +1,4 @@
-"""Plans: read from a built file, compiled from a robot file, copied for a run."""
+"""Plans from a built file or a compiled robot file, and copies of plans for a run."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from tfcompose.model.variables import SETTLE
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Mapping
     from datetime import date
 
     from tfcompose.foundation.findings import Span
@@ -30,12 +31,12 @@ PLAN = "plan.json"
 
 
 def is_plan(file: str) -> bool:
-    """Return whether the given file is a built plan, not a robot file."""
+    """Return whether the file is a built plan, according to its name, and not a robot file."""
     return file.endswith(".json")
 
 
 def in_folder(file: str) -> str:
-    """Return the plan in the given folder, as ``build`` writes one, else the file itself."""
+    """Return the path of the plan in a folder that ``build`` wrote, or else ``file`` unchanged."""
     plan = Path(file) / PLAN
     return str(plan) if is_file(plan) else file
 
@@ -44,7 +45,7 @@ def read_built_plan(file: Path) -> Plan:
     """Return the plan in the file.
 
     Raises:
-        SystemExit: after reporting its errors.
+        SystemExit: after the plan's errors are printed.
     """
     try:
         return read_plan(read_text(str(file)), str(file))
@@ -53,16 +54,18 @@ def read_built_plan(file: Path) -> Plan:
 
 
 def refuse_variant(arguments: Namespace, *more: str) -> None:
-    """Refuse --profile, --robot, --overlay, --set and arguments with a built plan.
+    """Reject --profile, --robot, --overlay, --set and arguments for a built plan.
+
+    A built plan has no variants.
 
     Raises:
-        SystemExit: after reporting that.
+        SystemExit: after an error message, if one of them is used.
     """
     if (
         arguments.profiles
         or arguments.overlays
         or arguments.settings
-        or getattr(arguments, "overlay_robot", None)
+        or getattr(arguments, "overlay_robot", None) is not None
         or any(getattr(arguments, option) for option in more)
     ):
         *options, last = [
@@ -90,13 +93,13 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
 def expected_plan(
     file: str, arguments: Namespace, day: date | None = None
 ) -> tuple[Plan, dict[str, Span]]:
-    """Return the plan of a robot file, plan.json or folder, and the edges' places.
+    """Return the plan of a robot file, plan.json or folder, and the places of its edges.
 
-    Places are by child; a built plan has none. ``day`` is the one whose calibrations apply; None:
-    those that still hold.
+    The places are by child; a built plan has no places. ``day`` selects the calibrations that were
+    valid on that day. None selects those that are still valid.
 
     Raises:
-        SystemExit: after reporting unreadable files and errors.
+        SystemExit: after an error message about unreadable files, or after the robot's errors.
     """
     file = in_folder(file)
     if is_plan(file):
@@ -110,10 +113,10 @@ def expected_plan(
 
 
 def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
-    """Return the plan for this host, with the guard options of the command line.
+    """Return the plan's part for this host, with the command line's options about the guard.
 
     Raises:
-        SystemExit: after reporting that there is no such share.
+        SystemExit: after an error message, if the plan has no part for this host.
     """
     if arguments.guard:
         plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
@@ -131,10 +134,10 @@ def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
 
 
 def host_share(plan: Plan, host: str | None, here: str) -> Plan:
-    """Return the share of the named host, or of ``here``.
+    """Return the plan's part for the named host, or for the host ``here``.
 
     Raises:
-        SystemExit: after reporting that there is none.
+        SystemExit: after an error message, if the plan has no such part.
     """
     share = share_of(plan, host, here)
     if not isinstance(share, Plan):
@@ -145,39 +148,31 @@ def host_share(plan: Plan, host: str | None, here: str) -> Plan:
 def copy_plan(
     plan: Plan, file: Path, runtime_dir: RuntimeDir, *, alone: bool, build_dir: Path | None = None
 ) -> Path:
-    """Copy the plan and its files to the run's folder; return the copy.
+    """Copy the plan and its files to the run's folder; return the path of the copy.
 
-    The copy keeps later builds from affecting the run. Meshes stay at their place: the copied
-    descriptions address them there. ``alone`` removes the copies of earlier runs. Relative paths
-    start at ``build_dir``, by default at the plan.
+    A later build then does not affect the run. Meshes are not copied. The copied descriptions
+    contain the absolute addresses of the meshes. ``alone`` removes the copies of earlier runs.
+    Relative paths in descriptions start at ``build_dir``; the default is the plan's folder.
 
     Raises:
-        SystemExit: after reporting that it cannot be copied.
+        SystemExit: after an error message, if the plan cannot be copied.
     """
-    parts = {PLAN: write_plan(plan).encode()}
-    descriptions = {
-        plan.description,
-        *(process.description for process in plan.processes if process.description is not None),
-    }
     try:
-        for name in (*descriptions, *(process.params_file for process in plan.processes)):
-            if name is not None and is_file(file.parent / name):
-                parts[name] = read_bytes(file.parent / name)
-        for name in descriptions & parts.keys():
+        parts = files_of(plan, file.parent)
+        for name in descriptions_of(plan) & parts.keys():
             parts[name] = _with_absolute_addresses(
                 parts[name], ((build_dir or file.parent) / name).parent
             )
-        digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
-        folder = runtime_dir.plan_folder(digest)
+        folder = runtime_dir.plan_folder(digest_of(parts))
         if alone:
             for old in set(runtime_dir.plan_folders()) - {folder}:
                 shutil.rmtree(old, ignore_errors=True)
         try:
-            _write_copy(parts, folder)
+            write_copy(parts, folder)
         except (
             FileNotFoundError
         ):  # who has won the race for the run removed it as an earlier one's
-            _write_copy(parts, folder)
+            write_copy(parts, folder)
     except RejectedError as error:
         reject(error.findings)
     except OSError as error:
@@ -185,10 +180,34 @@ def copy_plan(
     return folder / PLAN
 
 
-def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
+def descriptions_of(plan: Plan) -> set[str]:
+    """Return the names of the descriptions that belong to a plan."""
+    process_descriptions = {
+        process.description for process in plan.processes if process.description is not None
+    }
+    return {plan.description, *process_descriptions}
+
+
+def files_of(plan: Plan, folder: Path) -> dict[str, bytes]:
+    """Return the files that a run of the plan needs, by name; ``folder`` has all but the plan.
+
+    Raises:
+        RejectedError, OSError: if one cannot be read.
+    """
+    names = {*descriptions_of(plan), *(process.params_file for process in plan.processes)}
+    files = {name: read_bytes(folder / name) for name in names if name and is_file(folder / name)}
+    return {PLAN: write_plan(plan).encode(), **files}
+
+
+def digest_of(files: Mapping[str, bytes]) -> str:
+    """Return the name of a copy of these files."""
+    return hashlib.sha256(repr(sorted(files.items())).encode()).hexdigest()[:16]
+
+
+def write_copy(parts: Mapping[str, bytes], folder: Path) -> None:
     """Write the files, each atomically.
 
-    Another ``up`` may write the same ones while the run's processes read them.
+    Another ``up`` may write the same files while the run's processes read them.
     """
     for name, data in parts.items():
         file = folder / name
@@ -201,7 +220,7 @@ def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
 def _with_absolute_addresses(urdf: bytes, folder: Path) -> bytes:
     """Return a description with absolute addresses.
 
-    Bytes that are not text stay, and their reader rejects them.
+    Bytes that are not text stay unchanged, because their reader rejects them.
     """
     try:
         return with_absolute_addresses(urdf.decode("utf-8"), folder).encode()

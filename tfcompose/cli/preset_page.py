@@ -1,4 +1,4 @@
-"""One preset of a sensor, or of a node that publishes TF, as data and as a page."""
+"""The preset of a sensor, or of a node that publishes TF, as data and as a page."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     )
 
 
-#: What stands in names where the sensor's name will.
+#: The placeholder for the sensor's name in names.
 NAME = "NAME"
 
 
 def facts(name: str, library: Library) -> dict[str, Any]:
-    """Return the preset, with the default variant of each of its options, as plain data.
+    """Return the preset as plain data, with the default variant of each option.
 
     Unknown values are null.
     """
@@ -75,7 +75,7 @@ def facts(name: str, library: Library) -> dict[str, Any]:
 
 
 def text(preset: dict[str, Any], columns: int | None = None) -> str:
-    """Return the page, with lines of at most ``columns`` columns."""
+    """Return the page. No line is wider than ``columns``."""
     parts = [
         f"{preset['name']}  {preset['vendor']} {preset['model']},"  # noqa: ISC004
         f" {preset['kind']}\n{preset['about']}"
@@ -98,9 +98,9 @@ def text(preset: dict[str, Any], columns: int | None = None) -> str:
 
 
 def _fit_page(page: str, columns: int | None) -> str:
-    """Return the page with lines of at most ``columns`` columns.
+    """Return the page without lines that are wider than ``columns``.
 
-    Rows of cells that are too wide continue on the next line, cell by cell.
+    A row of cells that is too wide continues on the next line after a complete cell.
     """
     if columns is None:
         return page
@@ -141,7 +141,7 @@ def _plain(value: Any, preset: PresetSpec) -> Any:
 
 
 def _describe_keys(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return the texts under the keys, without empty ones."""
+    """Return the descriptions of the keys' values, without empty descriptions."""
     fields = {key: _plain(getattr(model, key), preset) for key in keys}
     return {key: value for key, value in fields.items() if value not in (None, "", {}, [], False)}
 
@@ -199,7 +199,7 @@ def _shape(shape: ShapeSpec) -> dict[str, Any]:
 
 
 def _optics(optics: PresetOptics, preset: PresetSpec) -> dict[str, Any]:
-    """Return the known properties of the stream, in SI, always with its frame."""
+    """Return the known properties of the stream in SI units, always with the stream's frame."""
     keys = tuple(key for key in PresetOptics.model_fields if key != "source")
     sources = [
         {"of": list(source.of), "where": source.where, "quality": source.quality}
@@ -354,7 +354,10 @@ def _topic(topic: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _degrees(sector: Sequence[float]) -> str:
-    """Return a sector in degrees: the full angle of a symmetric one, else its limits."""
+    """Return a sector in degrees.
+
+    The full angle if the sector is symmetric, otherwise its limits.
+    """
     start, end = (round(math.degrees(angle), 3) for angle in sector)
     return f"{number(2 * end)} deg" if start == -end else f"{number(start)} to {number(end)} deg"
 
@@ -384,7 +387,7 @@ def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
 def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
     """Return the sources of the optics' values.
 
-    Each document once, with its kind and the values it supplies.
+    Each document occurs once, with its kind and the values that it supplies.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for optics in streams:
@@ -407,8 +410,8 @@ _ROLE = re.compile(r"\{(\w+)\}")
 
 
 def node_rows() -> list[dict[str, str]]:
-    """Return all presets of nodes as rows of a list, by package."""
-    known = sorted(
+    """Return all presets of nodes as rows of a list, sorted by package."""
+    presets = sorted(
         ((name, node_preset(name)) for name in node_preset_names()), key=lambda row: row[1].package
     )
     return [
@@ -419,12 +422,12 @@ def node_rows() -> list[dict[str, str]]:
             "kind": "node",
             "about": preset.about,
         }
-        for name, preset in known
+        for name, preset in presets
     ]
 
 
 def node_facts(name: str) -> dict[str, Any]:
-    """Return the preset as plain data.
+    """Return the preset of a node as plain data.
 
     The frames of a claim have their default names.
     """
@@ -477,7 +480,7 @@ def _claim(claim: ClaimSpec, usual: Mapping[str, str]) -> dict[str, Any]:
 
 
 def node_text(preset: dict[str, Any], columns: int | None = None) -> str:
-    """Return the page, with lines of at most ``columns`` columns."""
+    """Return the page. No line is wider than ``columns``."""
     parts = [
         f"{preset['name']}  the node {preset['node']} of {preset['package']}\n{preset['about']}"
     ]
@@ -516,5 +519,5 @@ def _role_text(frame: dict[str, Any]) -> str:
 
 
 def _parameters(values: dict[str, Any]) -> str:
-    """Return parameters as ROS parses them: 0.0 and 0 have different types."""
+    """Return parameters in the form that ROS parses, where 0.0 and 0 have different types."""
     return _pairs({key: parameter(value) for key, value in values.items()})

@@ -10,10 +10,11 @@ from tfcompose.compiler.render.text import GREEN, RED, YELLOW
 if TYPE_CHECKING:
     from tfcompose.model.messages import ProcessStatus, RobotStatus
 
-    #: (cores, bytes) by process number.
+    #: Usage of processes: (CPU in cores, memory in bytes) by process number.
     Usage = dict[int, tuple[float, int]]
 
-#: So much of why a process is in its state fits into the table, in characters; JSON has all of it.
+#: Maximum number of characters of a state's reason in the table. JSON contains the complete
+#: reason.
 LONGEST_WHY = 40
 HEAD = ("PROCESS", "STATE", "PID", "UPTIME", "RESTARTS", "CPU", "MEMORY", "EDGES")
 
@@ -26,7 +27,7 @@ def state_of(status: RobotStatus) -> str:
 
 
 def row(process: ProcessStatus, used: Usage) -> tuple[str, ...]:
-    """Return the cells of a process; ``used`` is the usage of its process group, if known."""
+    """Return the cells of a process. ``used`` is the usage of each process group, if known."""
     cpu, memory = used.get(process.pid or 0, (None, None))
     return (
         process.name,
@@ -41,13 +42,13 @@ def row(process: ProcessStatus, used: Usage) -> tuple[str, ...]:
 
 
 def _state(process: ProcessStatus) -> str:
-    """Return the state in words, with its reason if that is not obvious."""
+    """Return the state in words, with the reason if it is not obvious."""
     state = process.state
     if process.state == "expected":
         return f"{state} of {process.host}" if process.host else state
     if process.state == "running":
         return state if process.ready else f"{state}, not ready"
-    if process.state == "stopped" and process.waits:  # it will be started
+    if process.state == "stopped" and process.waits:  # the launcher will start it
         return process.waits
     why = (
         f" ({process.detail[:LONGEST_WHY]}{'…' * (len(process.detail) > LONGEST_WHY)})"
@@ -66,7 +67,7 @@ def _colour(column: int, text: str) -> str:
 
 
 def uptime(seconds: float) -> str:
-    """Return an uptime for display: 42 s, 3:07 min or 12:30 h."""
+    """Return an uptime as text: 42 s, 3:07 min or 12:30 h."""
     total_s = int(seconds)
     if total_s < 60:  # noqa: PLR2004 (seconds of a minute)
         return f"{total_s} s"

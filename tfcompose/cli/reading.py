@@ -1,4 +1,4 @@
-"""Text of files named on the command line, and file lines quoted in findings."""
+"""Text of files on the command line, and lines of files for quotes in findings."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from functools import cache
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.reading import MOST_BYTES, no_text, read_bytes
 
-#: The name of standard input.
+#: The name for standard input.
 STDIN = "-"
-#: XML that findings quote, and parameters, calibrations, plans and launch files that are not XML.
+#: Two patterns for files that findings may quote: XML, and other files about robots (parameters,
+#: calibrations, plans, launch files).
 _XML = re.compile(r"<(?:robot|launch|package|sdf)\b|<xacro:|xmlns:xacro")
 _OTHERS = re.compile(
     r"\bros__parameters[\"']?\s*:"
@@ -23,11 +24,11 @@ _OTHERS = re.compile(
 
 
 def read_text(path: str) -> str:
-    """Return the file's text; ``-`` is standard input, which is read once.
+    """Return the file's text. The name ``-`` is standard input, which is read only once.
 
     Raises:
-        RejectedError: with one TF001 or TF008 finding, if it cannot be read, is not text, or is
-            too large.
+        RejectedError: if the file cannot be read, is not text, or is too large; with a finding
+            TF001 or TF008.
     """
     data = _standard_input() if path == STDIN else read_bytes(path)
     if len(data) > MOST_BYTES:
@@ -46,9 +47,9 @@ def _standard_input() -> bytes:
 
 
 def _decode_as_declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
-    """Return the text of a URDF in the encoding that it declares.
+    """Return the text of a URDF file in the encoding that the file declares.
 
-    Xacro reads UTF-8 whatever a file declares.
+    The encoding of other files, such as xacro, must be UTF-8.
     """
     is_urdf = path.endswith(".urdf")
     declared = is_urdf and re.match(
@@ -71,15 +72,15 @@ _withheld: set[str] = set()
 
 
 def quote(file: str) -> None:
-    """Let ``line_of`` quote a file, whatever it contains.
+    """Allow ``line_of`` to quote a file with any content.
 
-    The user named it for a command that reads such files.
+    The user has named the file for a command that reads such files.
     """
     _quoted.add(file)
 
 
 def withhold(file: str) -> None:
-    """Keep ``line_of`` from quoting a file that must not be read."""
+    """Forbid ``line_of`` to quote a file that must not be read."""
     _withheld.add(file)
 
 
@@ -93,7 +94,7 @@ def _lines(file: str) -> list[str]:
 
 
 def _is_of_a_robot(text: str) -> bool:
-    """Return whether a text is about robots.
+    """Return whether the text belongs to a robot.
 
     Other files can contain passwords, and lint's output may be public.
     """
@@ -103,7 +104,7 @@ def _is_of_a_robot(text: str) -> bool:
         return False
     if _OTHERS.search(text):
         return True
-    from tfcompose.spec.language.recognition import is_recognized  # pydantic is slow to load
+    from tfcompose.spec.language.recognition import is_recognized  # importing pydantic is slow
 
     return is_recognized(text)
 
@@ -116,7 +117,7 @@ def forget_lines() -> None:
 def line_of(file: str, line: int) -> str | None:
     """Return a line of a file, counted from 1.
 
-    None if there is none, or the file is not about robots.
+    Return None if there is no such line, or if the file must not be quoted.
     """
     if file in _withheld:
         return None

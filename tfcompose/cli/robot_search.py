@@ -1,4 +1,4 @@
-"""Search for the robot files below a folder."""
+"""Search for the robot files in a folder and its subfolders."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from tfcompose.cli.terminal import warn
 from tfcompose.foundation.procfs import PROC
 
 YAML_ENDINGS = (".yaml", ".yml")
-#: What a robot file has at the begin of a line: its first key, or, with that misspelt, two others
-#: of its keys.
+#: The key ``tfcompose`` at the beginning of a line. If the user has misspelt it, the key ``robot``
+#: and another key of robot files.
 _ROBOT = re.compile(
     rb"^tfcompose\s*:|\A(?=[\s\S]*^robot\s*:)"
     rb"(?=[\s\S]*^(?:links|joints|frames|sensors|parts)\s*:)",
     re.MULTILINE,
 )
 
-#: After this time a search for robot files says what it does, in seconds.
+#: Time in seconds after which the search prints what it does.
 SAY_AFTER_S = 5.0
-#: What the kernel shows as files: reading some waits, or does something.
+#: The kernel's file systems. Reading their files can block or have effects.
 _OF_KERNEL = frozenset({PROC, "/sys", "/dev"})
 
 
 def robots_in(name: str) -> list[str]:
-    """Return the file itself, or the robot files below a folder.
+    """Return the robot files in a folder, or else ``name`` itself.
 
-    Robot files are YAML files with a line that begins with tfcompose:. The search skips hidden
-    folders, those of the kernel, and other file systems (as ``find -xdev`` does).
+    A robot file is a YAML file with a line that begins with tfcompose:. The search skips hidden
+    folders, the kernel's folders, and other file systems (as ``find -xdev`` does).
     """
     from tfcompose.foundation.reading import is_file
 
@@ -49,7 +49,7 @@ def robots_in(name: str) -> list[str]:
 
 
 class _Progress:
-    """Prints once that a search takes long."""
+    """Prints a line, once, if a search takes long."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -57,7 +57,7 @@ class _Progress:
         self._files = 0
 
     def count_files(self, count: int) -> None:
-        """Count YAML files that were read."""
+        """Add to the number of YAML files that were read."""
         self._files += count
         if time.monotonic() >= self._say_at:
             self._say_at = float("inf")
@@ -68,7 +68,7 @@ class _Progress:
 
 
 def _device(folder: str) -> int:
-    """Return the file system of a folder, 0 if it cannot be accessed."""
+    """Return the number of the folder's file system, 0 if the folder cannot be accessed."""
     try:
         return os.stat(folder).st_dev  # noqa: PTH116 (as os.walk has it)
     except (OSError, ValueError):
@@ -81,11 +81,14 @@ def _is_searched(folder: str, device: int) -> bool:
 
 
 def is_robot(file: str) -> bool:
-    """Return whether it is a robot file, or unreadable: lint reports the reason."""
+    """Return whether the file is a robot file, or cannot be read.
+
+    For a file that cannot be read, lint then reports the reason.
+    """
     from tfcompose.foundation.findings import RejectedError
     from tfcompose.foundation.reading import read_bytes
 
     try:
         return bool(_ROBOT.search(read_bytes(file)))
-    except RejectedError as error:  # what is larger than a robot may be is none
+    except RejectedError as error:  # a file over the size limit is no robot file
         return all(finding.code == "TF001" for finding in error.findings)

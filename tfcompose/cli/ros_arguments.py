@@ -19,7 +19,7 @@ def ros_arguments(argv: Sequence[str]) -> RosArguments:
     """Return the arguments after ``--ros-args``.
 
     Raises:
-        SystemExit: after reporting one that cannot apply to a whole robot.
+        SystemExit: after an error message, if an argument cannot apply to all nodes of a robot.
     """
     arguments, rest = RosArguments(), list(argv)
     while rest:

@@ -1,4 +1,4 @@
-"""Running robots: selection, requests to the launcher, and its reports."""
+"""Running robots: their selection, requests to their launchers, and the launchers' reports."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.runtime_dir import Holder, RuntimeDir
     from tfcompose.model.messages import Notice, ProcessStatus, Request, Verb
-    from tfcompose.model.plan import Plan
+    from tfcompose.model.plan import Plan, PlanEdge
 
 A = TypeVar("A")
 
@@ -50,16 +50,16 @@ def running() -> list[tuple[RuntimeDir, Holder]]:
     """Return the running robots with their launchers.
 
     Raises:
-        RuntimeDirError: if there is no folder that only this user can open.
+        RuntimeDirError: if no folder exists that only this user can open.
     """
-    found = [(runtime_dir, runtime_dir.holder()) for runtime_dir in runtime_dirs(os.environ)]
-    return [(runtime_dir, holder) for runtime_dir, holder in found if holder]
+    runs = [(runtime_dir, runtime_dir.holder()) for runtime_dir in runtime_dirs(os.environ)]
+    return [(runtime_dir, holder) for runtime_dir, holder in runs if holder]
 
 
 def is_meant(runtime_dir: RuntimeDir, name: str) -> bool:
-    """Return whether this name selects the robot.
+    """Return whether the name selects the robot.
 
-    It may be the full name, or lack the domain, and also the host.
+    A name without the domain, or without domain and host, also selects the robot.
     """
     return name in {runtime_dir.name, runtime_dir.share, runtime_dir.robot}
 
@@ -67,55 +67,57 @@ def is_meant(runtime_dir: RuntimeDir, name: str) -> bool:
 def chosen_run(
     name: str | None, command: str, *, among: Callable[[], list[RuntimeDir]] | None = None
 ) -> RuntimeDir:
-    """Return the selected robot: one that runs, or one ``among`` others.
+    """Return the selected robot among the running robots, or among the results of ``among``.
 
-    Without a name that is the one in this shell's ROS domain, else the one of the ``robot.yaml``
-    here. ``command`` is the user's command, for an example with another name.
+    Without a name, select the robot in this shell's ROS domain, or else the robot of
+    ``robot.yaml`` here. ``command`` is the user's command, for an example in the error message.
 
     Raises:
-        SystemExit: after reporting that there is none, or the candidates.
+        SystemExit: after an error message, if no robot or several robots match.
     """
     try:
-        known = among() if among else [runtime_dir for runtime_dir, _ in running()]
+        candidates = among() if among else [runtime_dir for runtime_dir, _ in running()]
     except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
     verb = "has run" if among else "runs"
-    found = (
-        [runtime_dir for runtime_dir in known if is_meant(runtime_dir, name)]
+    matches = (
+        [runtime_dir for runtime_dir in candidates if is_meant(runtime_dir, name)]
         if name
-        else in_scope(known)
+        else in_scope(candidates)
     )
-    names = list_names([runtime_dir.name for runtime_dir in known], NAMED_AT_MOST)
-    if not known:
+    names = list_names([runtime_dir.name for runtime_dir in candidates], NAMED_AT_MOST)
+    if not candidates:
         fail(f"no robot {verb} here")
-    if not found and name:
+    if not matches and name:
         fail(f"no robot {name} {verb} here; known robots: {names}")
-    if not found:
-        example = f"tfcompose {command} --robot {known[0].name}"
+    if not matches:
+        example = f"tfcompose {command} --robot {candidates[0].name}"
         fail(
             f"no robot {verb} in ROS domain {domain_of(os.environ)}; elsewhere: {names}"
             f" ({example})"
         )
-    if len(found) > 1:
+    if len(matches) > 1:
         fail(
-            f"several robots: {', '.join(run.name for run in found)}; choose one with --robot",
+            f"several robots: {', '.join(run.name for run in matches)}; choose one with --robot",
             UNREADABLE,
         )
-    return found[0]
+    return matches[0]
 
 
 def in_scope(places: list[RuntimeDir]) -> list[RuntimeDir]:
     """Return the robots in this shell's ROS domain.
 
-    If there are none, return those that the ``robot.yaml`` here names.
+    If there are no such robots, return the robots with the name in ``robot.yaml`` here.
     """
-    found = [runtime_dir for runtime_dir in places if runtime_dir.domain == domain_of(os.environ)]
-    robot = _robot_here() if places and not found else None
-    return found or [runtime_dir for runtime_dir in places if runtime_dir.robot == robot]
+    matches = [
+        runtime_dir for runtime_dir in places if runtime_dir.domain == domain_of(os.environ)
+    ]
+    robot = _robot_here() if places and not matches else None
+    return matches or [runtime_dir for runtime_dir in places if runtime_dir.robot == robot]
 
 
 def _robot_here() -> str | None:
-    """Return the name in this folder's robot file, if it can be read."""
+    """Return the robot's name in ``robot.yaml`` here, None if the file cannot be read."""
     from tfcompose.spec.load import load
 
     try:
@@ -126,7 +128,10 @@ def _robot_here() -> str | None:
 
 
 def request(runtime_dir: RuntimeDir, question: Request, answer: type[A]) -> A | None:
-    """Return the launcher's answer, or None after reporting that there is none, or a refusal."""
+    """Return the launcher's answer, None if there is none.
+
+    If the launcher refuses or does not answer, the function prints a message.
+    """
     try:
         return ask(runtime_dir, question, answer)
     except RequestRefusedError as error:
@@ -137,10 +142,11 @@ def request(runtime_dir: RuntimeDir, question: Request, answer: type[A]) -> A | 
 
 
 def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
-    """Have the launcher apply the verb to each named process; return the exit code.
+    """Ask the launcher to apply the verb to each named process; return the exit code.
 
     Raises:
-        SystemExit: if a robot file is named instead of processes, or no robot is chosen.
+        SystemExit: if the user names a robot file instead of processes, or if no robot is
+            selected.
     """
     files = [name for name in arguments.name if name.endswith((".yaml", ".yml"))]
     if files:
@@ -161,14 +167,15 @@ def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
 def notices(
     runtime_dir: RuntimeDir, timeout_s: float | None = None, output: TextIO | None = None
 ) -> Iterator[tuple[Notice, float]]:
-    """Yield past and new notices of the launcher with their times, until it ends.
+    """Yield past and new notices of the launcher with their times, until the launcher ends.
 
-    ``output`` is where the caller prints them: once its reader is gone, the notices end, even if
-    none comes.
+    The caller prints the notices on ``output``. When the reader of ``output`` is gone, the notices
+    end, even without a new notice.
 
     Raises:
-        OSError: if the launcher cannot be reached; TimeoutError if the time is over;
-            BrokenPipeError if the reader is gone.
+        OSError: if the launcher cannot be reached.
+        TimeoutError: after ``timeout_s``.
+        BrokenPipeError: if the reader of ``output`` is gone.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(runtime_dir) as connection:
@@ -197,10 +204,10 @@ def notices(
 def wait_until_ready(
     runtime_dir: RuntimeDir, timeout_s: float | None, *, without_errors: bool = False
 ) -> int:
-    """Wait until every process is ready and every edge live.
+    """Wait until every process is ready and every edge is live.
 
-    ``without_errors`` waits also until the guard sees no error. Return 0, or 1 after reporting why
-    that did not happen.
+    With ``without_errors``, also wait until the guard sees no error. Return 0, or 1 after a
+    message with the reason.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     while True:
@@ -245,9 +252,9 @@ def print_missing(runtime_dir: RuntimeDir, timeout_s: float) -> None:
 
 
 def _why_not_ready(process: ProcessStatus) -> str:
-    """Return the conditions that its start waits for.
+    """Return the conditions for which the start of the process waits.
 
-    For a started process: its state, its missing conditions, and the last observation.
+    For a started process, return its state, the missing conditions, and the last observation.
     """
     if process.state == "stopped" and process.waits:
         return process.waits
@@ -262,10 +269,13 @@ def _why_not_ready(process: ProcessStatus) -> str:
 
 
 def since(holder: Holder) -> str:
-    """Return the start in local time: 14:03:27, with the date if that is not today."""
-    at, today = time.localtime(holder.since), time.localtime()
-    form = "%H:%M:%S" if at[:3] == today[:3] else "%Y-%m-%d %H:%M:%S"
-    return time.strftime(form, at)
+    """Return the local time of the launcher's start, such as 14:03:27.
+
+    The text includes the date if the launcher did not start today.
+    """
+    then, today = time.localtime(holder.since), time.localtime()
+    form = "%H:%M:%S" if then[:3] == today[:3] else "%Y-%m-%d %H:%M:%S"
+    return time.strftime(form, then)
 
 
 def find_hidden_run(runtime_dir: RuntimeDir) -> str | None:
@@ -288,7 +298,7 @@ def find_hidden_run(runtime_dir: RuntimeDir) -> str | None:
 
 
 def warnings_before_start(runtime_dir: RuntimeDir, plan: Plan, run_id: str) -> list[str]:
-    """Return obstacles to the start of a robot, one sentence each."""
+    """Return a sentence for each circumstance that may disturb the robot's start."""
     return [
         *other_domains(runtime_dir),
         *_left_behind(runtime_dir, run_id),
@@ -297,55 +307,60 @@ def warnings_before_start(runtime_dir: RuntimeDir, plan: Plan, run_id: str) -> l
 
 
 def _neighbours(runtime_dir: RuntimeDir, plan: Plan) -> Iterator[str]:
-    """Name other robots that run in the domain on the same TF topics.
+    """Yield a sentence for each other robot in the domain with the same TF topics.
 
-    Each guard would report the other's nodes.
+    The guard of each robot would report the other robot's nodes.
     """
-    found = [
-        (other.robot, holder)
-        for other, holder in running()
-        if other.domain == runtime_dir.domain
-        and other.robot != runtime_dir.robot
-        and _share_topics(other, plan)
+    neighbours = [
+        (neighbour.robot, holder)
+        for neighbour, holder in running()
+        if neighbour.domain == runtime_dir.domain
+        and neighbour.robot != runtime_dir.robot
+        and _share_topics(neighbour, plan)
     ]
-    for robot, holder in found:
+    for robot, holder in neighbours:
         where = f"runs in domain {runtime_dir.domain} on the same TF topics"
         yield f"{robot} (pid {holder.pid}, since {since(holder)}) {where}"
-    if found:
+    if neighbours:
         yield (
             "each guard will report the other's edges: give one ros: {domain_id: N}, "
             "or ros: {namespace: NAME, isolate: topics}"
         )
 
 
-def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
-    """Return whether the plan that runs there shares TF topics with this one."""
-    running_plan = plan_of_run(other)
+def _share_topics(neighbour: RuntimeDir, plan: Plan) -> bool:
+    """Return whether the plan of the other run has TF topics in common with this plan."""
+    running_plan = plan_of_run(neighbour)
     return running_plan is not None and not judged_topics(plan).isdisjoint(
         judged_topics(running_plan)
     )
 
 
 def other_domains(runtime_dir: RuntimeDir) -> Iterator[str]:
-    """Name runs of the same robot in other domains, as after a change of domain_id."""
-    for other, holder in running():
-        if other.share == runtime_dir.share and other.domain != runtime_dir.domain:
+    """Yield a sentence for each run of this robot in another domain.
+
+    Such runs remain after a change of domain_id.
+    """
+    for running_dir, holder in running():
+        if running_dir.share == runtime_dir.share and running_dir.domain != runtime_dir.domain:
             yield (
-                f"{other.name} still runs (pid {holder.pid}, since {since(holder)}); "
-                f"tfcompose down --robot {other.name} stops it"
+                f"{running_dir.name} still runs (pid {holder.pid}, since {since(holder)}); "
+                f"tfcompose down --robot {running_dir.name} stops it"
             )
 
 
 def plan_file(runtime_dir: RuntimeDir) -> Path:
-    """Return the copy of the plan that a robot runs.
+    """Return the path of the plan that the robot runs.
 
-    Raises OSError or ValueError if it is gone.
+    Raises:
+        OSError: if the copy disappears.
+        ValueError: if there is no copy.
     """
     return max(runtime_dir.plan_folders(), key=lambda folder: folder.stat().st_mtime) / "plan.json"
 
 
 def plan_of_run(runtime_dir: RuntimeDir) -> Plan | None:
-    """Return the plan that a robot runs, or None if it cannot be read any more."""
+    """Return the plan that a robot runs, None if the plan cannot be read."""
     try:
         return read_plan(plan_file(runtime_dir).read_text("utf-8"), "plan.json")
     except (OSError, ValueError, RejectedError):
@@ -355,24 +370,30 @@ def plan_of_run(runtime_dir: RuntimeDir) -> Plan | None:
 def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
     """Return the only robot that runs in this shell's ROS domain, and its plan.
 
-    None if there is none, or several.
+    Return None if no robot or several robots run there.
     """
     try:
-        found = [
+        matches = [
             runtime_dir
             for runtime_dir, _ in running()
             if runtime_dir.domain == domain_of(os.environ)
         ]
     except RuntimeDirError:
         return None
-    plan = plan_of_run(found[0]) if len(found) == 1 else None
-    return (found[0], plan) if plan else None
+    plan = plan_of_run(matches[0]) if len(matches) == 1 else None
+    return (matches[0], plan) if plan else None
+
+
+def adjusted_edges(robot: str) -> tuple[PlanEdge, ...]:
+    """Return the adjusted edges of this robot, if it alone runs in this shell's ROS domain."""
+    run = run_of_domain()
+    return run[1].adjusted if run and run[1].robot == robot else ()
 
 
 def plan_of_domain() -> Plan | None:
-    """Return the plan of the only robot in this shell's ROS domain, and print its name.
+    """Print the name of the only robot in this shell's ROS domain, and return its plan.
 
-    None if there is none.
+    Return None if no robot or several robots run there.
     """
     running = run_of_domain()
     if running is None:
@@ -382,14 +403,14 @@ def plan_of_domain() -> Plan | None:
 
 
 def _left_behind(runtime_dir: RuntimeDir, run_id: str) -> Iterator[str]:
-    """Name processes of earlier runs that still run."""
-    found = [
+    """Yield a sentence for each process that an earlier run left running."""
+    remaining = [
         leftover
         for leftover in leftovers(f"{runtime_dir.name}:")
         if leftover.run != run_id and leftover.launcher is None
     ]
-    for leftover in found:
+    for leftover in remaining:
         yield f"an earlier run left process {leftover.pid} behind: {leftover.command}"
-    if found:
-        them = "it" if len(found) == 1 else "them"
+    if remaining:
+        them = "it" if len(remaining) == 1 else "them"
         yield f"tfcompose down --leftovers --robot {runtime_dir.name} stops {them}"

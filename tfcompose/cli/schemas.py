@@ -15,7 +15,7 @@ def languages() -> tuple[str, ...]:
     return (*LANGUAGES, *installed_tools().languages())
 
 
-#: Languages whose keys are not described for people, and why.
+#: Languages without a reference of keys for users, and the reason.
 WITHOUT_REFERENCE = {
     "overlay": "an overlay has the keys of a robot file",
     "plan": "build writes plan.json",
@@ -28,7 +28,7 @@ def languages_with_reference() -> list[str]:
 
 
 def schema_text(language: str) -> str:
-    """Return the schema as in the files under ``schemas/``."""
+    """Return the JSON Schema, as in the files under ``schemas/``."""
     return json.dumps(_schema(language), indent=2, ensure_ascii=False) + "\n"
 
 
@@ -41,6 +41,6 @@ def _schema(language: str) -> dict[str, object]:
     from tfcompose.compiler.resolve.presets import node_preset_names
     from tfcompose.spec.language.json_schema import json_schema
 
-    known = library()
-    presets = {name: known.get(name) for name in known.names}
+    presets_of_product = library()
+    presets = {name: presets_of_product.get(name) for name in presets_of_product.names}
     return json_schema(language, presets, node_preset_names())

@@ -1,7 +1,6 @@
-"""Screen that redraws its changed rows in place on a terminal.
+"""Screen that redraws only its changed rows in place on a terminal.
 
-A drawing sends only the rows that changed since the last one. A view that changes 20 times a
-second then sends a few rows over a slow link each time, not a screen.
+If a few rows change 20 times a second, only these rows are sent over a slow link, not the screen.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ if TYPE_CHECKING:
 
     from tfcompose.launcher.output import NonBlockingOutput
 
-#: Clears what is below the cursor's row.
+#: Clears the rows below the cursor's row.
 _CLEAR_BELOW = "\n\033[J\033[A"
-#: The other screen of a terminal, without the cursor, and the way back: xterm's modes 1049 and 25.
+#: Switches to the alternate screen without a cursor, and back: xterm's modes 1049 and 25.
 _OTHER_SCREEN = "\033[?1049h\033[?25l"
 _OWN_SCREEN = "\033[?25h\033[?1049l"
 
@@ -32,18 +31,18 @@ _OWN_SCREEN = "\033[?25h\033[?1049l"
 class Rows:
     """Rows of text that are redrawn in place.
 
-    The cursor is on the last one between drawings.
+    Between drawings, the cursor is on the last row.
     """
 
     def __init__(self) -> None:
         self._drawn: list[str] = []
 
     def forget(self) -> None:
-        """Begin at the cursor's row, with empty rows below."""
+        """Begin at the cursor's row, with empty rows below it."""
         self._drawn = []
 
     def change(self, rows: Sequence[str]) -> str:
-        """Return the output that replaces the drawn rows by these."""
+        """Return the output that replaces the drawn rows by ``rows``."""
         before, self._drawn = self._drawn, list(rows)
         if before == self._drawn:
             return ""
@@ -51,7 +50,7 @@ class Rows:
         kept = [*before, *[""] * (len(rows) - len(before))]
         lines = [""] * len(rows)
         for number, row in enumerate(rows):
-            if row != kept[number]:  # cleared first: behind a full row the cursor stands on it
+            if row != kept[number]:  # clear first: text of full width would lose its end
                 lines[number] = f"{CLEAR_LINE}{row}"
         below = _CLEAR_BELOW if len(rows) < len(before) else ""
         return up + "\n".join(lines) + below
@@ -68,22 +67,23 @@ class LiveLines:
     def draw(self, lines: Sequence[str]) -> None:
         """Redraw the lines in place.
 
-        Lines that do not fit on the terminal are only counted.
+        If not all lines fit on the terminal, the last row tells the number of the missing lines.
         """
         columns, rows = size_of(self._stream.fileno())
         room = max(rows - 1, 2)
-        shown = list(lines)
-        if len(shown) > room:
-            shown = [
-                *shown[: room - 1],
-                f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe",
+        drawn = list(lines)
+        if len(drawn) > room:
+            drawn = [
+                *drawn[: room - 1],
+                f"… {len(drawn) - room + 1} more; a larger window shows them, or a pipe",
             ]
         if columns < self._columns:
-            # What was drawn takes more lines now, and how many is the terminal's secret.
+            # The terminal wraps the drawn lines now, and the number of rows that they fill is
+            # unknown.
             self._stream.write(CLEAR)
             self._rows.forget()
         self._columns = columns
-        fitted = [_fit_line(line, columns - 1) for line in shown]
+        fitted = [_fit_line(line, columns - 1) for line in drawn]
         self._stream.write(self._rows.change([*fitted, ""]))
         self._stream.flush()
 
@@ -96,8 +96,8 @@ def _fit_line(line: str, width: int) -> str:
 class Screen:
     """The alternate screen of a terminal, during the ``with`` block.
 
-    Ctrl-C and Ctrl-Z remain signals; Ctrl-S is an ordinary key. It never blocks on a terminal that
-    takes no output. It raises OSError if the terminal is gone.
+    Ctrl-C and Ctrl-Z remain signals. Ctrl-S is an ordinary key. If the terminal accepts no output,
+    the screen does not block. If the terminal is gone, the methods raise OSError.
     """
 
     def __init__(self, keys_fd: int, output: NonBlockingOutput) -> None:
@@ -123,13 +123,16 @@ class Screen:
         settings[6][termios.VMIN], settings[6][termios.VTIME] = 1, 0
         termios.tcsetattr(
             self.fd, termios.TCSANOW, settings
-        )  # the others wait until the terminal has taken all
+        )  # the other modes wait until the terminal has accepted all output
         self._is_shown = True
         self.output.write(_OTHER_SCREEN)
         self.redraw()
 
     def redraw(self) -> None:
-        """Send all rows with the next drawing: others may have written to the terminal."""
+        """Send all rows at the next drawing.
+
+        Call this when other programs may have written to the terminal.
+        """
         self._size = (0, 0)
 
     def leave(self) -> None:
@@ -144,7 +147,10 @@ class Screen:
             termios.tcsetattr(self.fd, termios.TCSANOW, self._before)
 
     def draw(self, rows: Callable[[int, int], list[str]]) -> bool:
-        """Draw the rows returned for this size, unless the terminal is still busy."""
+        """Draw the rows for the current size. Return False if the terminal is still busy.
+
+        ``rows`` returns the rows from columns and rows of the terminal.
+        """
         if not self._is_shown:
             return True
         if self.output.owes:

@@ -1,4 +1,4 @@
-"""Commands that start a robot, or only its guard: their arguments, and the steps to the start."""
+"""Arguments and steps of commands that start a robot, or only its guard."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import (
     DEFAULT_FILE,
-    add_robot_overlay,
     add_ros_args,
     add_variant,
     not_negative,
@@ -26,8 +25,7 @@ def add_start_arguments(parser: ArgumentParser, *, guard_alone: bool = False) ->
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
     )
-    add_variant(parser)
-    add_robot_overlay(parser, "HOSTNAME.yaml, if there is one", by_hostname=True)
+    add_variant(parser, robot="HOSTNAME.yaml, if there is one", by_hostname=True)
     add_ros_args(parser)
     parser.add_argument(
         "-o", "--output", metavar="DIR", help="where to build; default: build/ROBOT"
@@ -117,10 +115,10 @@ def add_start_arguments(parser: ArgumentParser, *, guard_alone: bool = False) ->
 def build_and_start(arguments: Namespace) -> int:
     """Start the plan and return the exit code.
 
-    0 after a clean end, 1 after a failure or a finding, 2 unreadable.
+    The code is 0 after a clean end, 1 after a failure or a finding, 2 if something cannot be read.
 
     Raises:
-        SystemExit: after the reason why nothing can be built or started.
+        SystemExit: after an error message, if nothing can be built or started.
     """
     from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
 
@@ -144,18 +142,18 @@ def build_and_start(arguments: Namespace) -> int:
     from tfcompose.cli.build_process import BuildProcess
 
     with BuildProcess(arguments) as build:
-        from tfcompose.cli.starting import load_forker, start  # while it is built
+        from tfcompose.cli.starting import load_forker, start  # during the build
 
         forker = load_forker(arguments)
-        plan_file, found = build.wait_until_built()
-    return start(plan_file, arguments, forker, found, events)
+        plan_file, findings = build.wait_until_built()
+    return start(plan_file, arguments, forker, findings, events)
 
 
 def _open_events(path: str | None) -> EventStream | None:
-    """Return the stream to a file or named pipe; None if there is no path.
+    """Return the stream to a file or named pipe, None without a path.
 
     Raises:
-        SystemExit: after reporting that it cannot be opened.
+        SystemExit: after an error message, if the file cannot be opened.
     """
     if path is None:
         return None

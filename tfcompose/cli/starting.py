@@ -1,7 +1,7 @@
 """Start of a robot on this machine by ``up``: checks, runtime directory, launcher.
 
-With ``-d`` the launcher continues in the background, and the command follows it until the robot is
-up.
+With ``-d``, the launcher continues in the background. The command waits until the robot has
+started, or is ready.
 """
 
 from __future__ import annotations
@@ -84,15 +84,16 @@ if TYPE_CHECKING:
 
 
 def load_forker(arguments: Namespace) -> Forker | None:
-    """Load the modules of own processes; None if ROS does not load, or nothing starts.
+    """Import the modules of tfcompose's own processes into a process that can fork them.
 
-    ROS ends a process that imports it without the middleware that the environment names.
+    Return None if ROS cannot be imported, or if the command starts nothing. This must not be done
+    without the middleware that the environment names, because ROS would end the process.
     """
     if arguments.update or ros_trouble(os.environ):
         return None
     try:
         return Forker(load_shared, run_process)
-    except ImportError:  # they say what is missing
+    except ImportError:  # tfcompose's processes report the missing module
         return None
 
 
@@ -103,13 +104,13 @@ def start(
     built_with: Sequence[Finding] = (),
     events: EventStream | None = None,
 ) -> int:
-    """Check all that the plan in the file needs, and start it; return ``up``'s exit code.
+    """Check everything that the plan in the file needs, and start it; return ``up``'s exit code.
 
-    ``forker`` has loaded the modules of tfcompose's own processes. ``built_with`` are the warnings
-    of the plan's build, which were printed. ``events`` receives each notice.
+    ``forker`` has imported the modules of tfcompose's own processes. ``built_with`` are the
+    warnings of the plan's build, which were printed. ``events`` receives each notice.
 
     Raises:
-        SystemExit: after the reason why the plan cannot be started.
+        SystemExit: after an error message, if the plan cannot be started.
     """
     plan = plan_to_start(read_built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
@@ -138,7 +139,10 @@ def start(
             forker=forker,
             events=events,
         )
-        warnings = warnings_before_start(runtime_dir, plan, session.run_id)
+        warnings = [
+            *_unnamed_overlays(plan, arguments),
+            *warnings_before_start(runtime_dir, plan, session.run_id),
+        ]
         for warning in warnings:
             warn(warning)
         if arguments.detach or arguments.wait:
@@ -146,20 +150,29 @@ def start(
         if arguments.live and can_show_live():
             mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
             pid = _fork(plan, runtime_dir, lock, session, arguments.duration, mask)
-            stack.close()  # the lock is the launcher's from now on
+            stack.close()  # from now on, the launcher holds the lock
             return follow(runtime_dir, plan, pid, mask, built_with, warnings)
         session.output = NonBlockingOutput(sys.stdout.fileno())
         stack.callback(session.output.close)
         return _run(plan, runtime_dir, session, session.output, arguments.duration)
 
 
+def _unnamed_overlays(plan: Plan, arguments: Namespace) -> list[str]:
+    """Return a line that names the merged overlays that the command line does not name."""
+    named = len(arguments.overlays) + len(arguments.settings)
+    unnamed = plan.overlays[: len(plan.overlays) - named]
+    if not unnamed or arguments.overlay_robot is not None:
+        return []
+    return [f"{plan.robot}: {', '.join(unnamed)} merged over {plan.file}"]
+
+
 def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
     """Print warnings, and exit if something prevents the start.
 
     Raises:
-        SystemExit: after reporting all obstacles.
+        SystemExit: after error messages about all obstacles.
     """
-    trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True), plan.ros)
+    trouble = ros_trouble(child_environment(os.environ, plan.ros, is_built_in=True), plan.ros)
     findings = (
         [trouble]
         if trouble
@@ -199,9 +212,9 @@ def _run(
 
 
 def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespace) -> int:
-    """Switch the running robot to the plan.
+    """Change the running robot to the plan.
 
-    Exit code 0; 1 if nothing changed although the command was to start it here.
+    Return 0; 1 if nothing changed although the user wanted to start the robot here.
     """
     holder = runtime_dir.holder()
     who = (
@@ -216,7 +229,8 @@ def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespac
     answer = request(runtime_dir, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
         fail(who)
-    changes = describe_changes(answer, ("restarted", "started", "stopped", "new description for"))
+    labels = ("restarted", "started", "stopped", "new description for", "moved")
+    changes = describe_changes(answer, labels)
     if answer.differs:
         print(f"{who}; {changes or 'the plan changed, and nothing had to restart'}")
     elif changes:
@@ -231,7 +245,7 @@ def _update(plan: Plan, file: Path, runtime_dir: RuntimeDir, arguments: Namespac
 
 
 def _with_profiles(finding: Finding, arguments: Namespace) -> Finding:
-    """Return the finding; if programs are missing, with profiles that do not need them."""
+    """Return the finding. If it is about missing programs, add profiles that do not need them."""
     if finding.code != "TF810" or is_plan(arguments.file):
         return finding
     profiles = _profiles_that_start(arguments)
@@ -242,20 +256,22 @@ def _with_profiles(finding: Finding, arguments: Namespace) -> Finding:
 
 
 def _profiles_that_start(arguments: Namespace) -> str:
-    """Return the profiles for which every program exists, as ``a or b``; empty if there are none.
+    """Return the profiles for which every program exists, such as ``a or b``, empty without any.
 
-    They replace the requested ones, or else are added to them: ``sim --profile a``.
+    The profiles replace the requested profiles, or else are added to them: ``sim --profile a``.
     """
-    from tfcompose.spec.language import profiles_in, with_includes
-    from tfcompose.spec.load import load
+    from tfcompose.cli.compiling import load_robot
+    from tfcompose.spec.language import profiles_in
 
     try:
-        source = with_includes(load(read_text(arguments.file), arguments.file), read_text)
+        source = load_robot(arguments.file)
         names = [name for name in profiles_in(source) if name not in arguments.profiles]
-        for others in dict.fromkeys(((), tuple(arguments.profiles))):
-            fitting = [name for name in names if _starts_with(source, [*others, name], arguments)]
+        for profiles in dict.fromkeys(((), tuple(arguments.profiles))):
+            fitting = [
+                name for name in names if _starts_with(source, [*profiles, name], arguments)
+            ]
             if fitting:
-                return " --profile ".join([*others, " or ".join(fitting)])
+                return " --profile ".join([*profiles, " or ".join(fitting)])
     except RejectedError:
         pass
     return ""
@@ -266,7 +282,7 @@ def _starts_with(source: Source, profiles: Sequence[str], arguments: Namespace) 
     from tfcompose.compiler.compile import compile_source
     from tfcompose.compiler.emit.plan import plan_of
 
-    overlays, inputs = overlays_of(arguments, source=source), inputs_of(arguments)
+    overlays, inputs = overlays_of(arguments, source), inputs_of(arguments)
     compiled = compile_source(source, library(), profiles, overlays, read_text, inputs=inputs)
     if compiled.robot is None or compiled.errors:
         return False
@@ -279,9 +295,9 @@ def _starts_with(source: Source, profiles: Sequence[str], arguments: Namespace) 
 def _detach(
     plan: Plan, runtime_dir: RuntimeDir, lock: Lock, session: RunSession, arguments: Namespace
 ) -> int:
-    """Start the launcher as a separate process; return 0 once all processes started, or are ready.
+    """Start the launcher as a separate process, and wait until the robot has started.
 
-    1 if they do not.
+    With --wait, wait until all processes are ready. Return 0, or 1 if this does not happen.
     """
     if goes_with_logout(runtime_dir):
         user = user_name()
@@ -303,7 +319,8 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
 ) -> int:
     """Start the launcher as a separate process, and return its process id.
 
-    With a ``mask``, the signal mask to restore there, it ends with this process.
+    With a ``mask``, the launcher ends together with this process, and ``mask`` becomes its signal
+    mask.
     """
     sys.stdout.flush()
     sys.stderr.flush()
@@ -332,10 +349,10 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
 def _launch(
     plan: Plan, runtime_dir: RuntimeDir, session: RunSession, duration_s: float | None
 ) -> int:
-    """Run as a process without a terminal; Python's own errors go to a file next to the logs."""
+    """Run the launcher without a terminal. Python's own errors go to a file next to the logs."""
     os.setsid()
     nowhere = errors = os.open(os.devnull, os.O_RDWR)
-    with contextlib.suppress(OSError):  # a full disk stops no robot
+    with contextlib.suppress(OSError):  # a full disk must not stop a robot
         runtime_dir.logs.mkdir(parents=True, exist_ok=True)
         errors = os.open(
             runtime_dir.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640

@@ -1,9 +1,9 @@
-"""Tables of text: unfitted for files and pipes, fitted and coloured for a terminal.
+"""Tables of text: unchanged for files and pipes, fitted and coloured for a terminal.
 
-A pipe gets the same bytes whatever the terminal is. On a narrow terminal the least important
-columns are dropped. Names are shortened after their first third, because their ends distinguish
-them. An edge's parent is shortened before its child, which identifies the edge. rich would shorten
-numbers, too.
+The output into a pipe does not depend on the terminal. On a narrow terminal, the table drops the
+least important columns. Names are shortened after their first third, because their ends
+distinguish them. An edge's parent is shortened before its child, which identifies the edge. The
+package rich is not used, because it would also shorten numbers.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ if TYPE_CHECKING:
 class Table:
     """Layout of a table's columns, by index from 0."""
 
-    #: Columns aligned to the right.
+    #: Right-aligned columns.
     right: frozenset[int] = frozenset()
-    #: Columns to drop, in this order, until those in ``least`` can be shortened enough to fit.
+    #: Columns to drop, in this order. Dropping ends when shortening the columns in ``least`` is
+    #: sufficient.
     spare: tuple[int, ...] = ()
     #: Columns to shorten, in this order, with their minimum width in characters.
     least: Mapping[int, int] = field(default_factory=dict)
-    #: Returns the colour of a cell from its column and text; empty: none.
+    #: Returns the colour of a cell from its column and text, empty for no colour.
     colour: Callable[[int, str], str] | None = None
 
     def lines(
@@ -40,7 +41,7 @@ class Table:
     ) -> list[str]:
         """Return a line for each row, narrower than ``width`` if possible.
 
-        A terminal's last column stays free.
+        The last column of a terminal stays free.
         """
         widths = {
             column: max(map(len, cells)) for column, cells in enumerate(zip(*rows, strict=True))
@@ -71,21 +72,22 @@ class Table:
             text = shorten(row[column], width, at_end=column == last)
             code = colour(column, row[column]) if colour else ""
             blank = " " * (width - len(text))
-            shown = f"{code}{text}{PLAIN}" if code else text
-            cells.append(f"{blank}{shown}" if column in self.right else f"{shown}{blank}")
+            coloured = f"{code}{text}{PLAIN}" if code else text
+            cells.append(f"{blank}{coloured}" if column in self.right else f"{coloured}{blank}")
         return "  ".join(cells).rstrip()
 
 
 def _excess(widths: dict[int, int], width: int) -> int:
-    """Return by how many characters the columns are too wide."""
+    """Return the number of characters by which the columns are too wide."""
     return sum(widths.values()) + 2 * (len(widths) - 1) - width
 
 
 def shorten(text: str, width: int, *, at_end: bool = False) -> str:
     """Return the text in ``width`` characters, with an ellipsis after its first third.
 
-    ``at_end`` puts it at the end. An edge, ``parent → child``, is shortened after the first third
-    of the parent, or if there is no room for that, of the child alone.
+    With ``at_end``, the ellipsis is at the end. For an edge (``parent → child``), the ellipsis is
+    after the first third of the parent. If there is no space for that, only the shortened child
+    remains.
     """
     if len(text) <= width:
         return text

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 FOLDER = Path(__file__).parents[1] / "data" / "templates"
-#: By template: what it is, and the files that it is made of besides the first.
+#: Description of each template, and its files besides the robot file.
 TEMPLATES = {
     "diffbot": ("a base with two driven wheels, a laser and a depth camera", ()),
     "arm": ("an arm of three joints on a bench, with a camera at its wrist", ()),
@@ -26,10 +26,10 @@ SCHEMA = "robot.schema.json"
 def template_files(arguments: Namespace, default_name: str, output: Path) -> dict[Path, str]:
     """Return the texts of a template by file, the robot file first.
 
-    The robot is named as requested, or else by default.
+    The robot's name comes from the command line, or else is ``default_name``.
 
     Raises:
-        SystemExit: after reporting that no robot can have the name.
+        SystemExit: after an error message, if the name is invalid.
     """
     template = arguments.template
     name = default_name if arguments.name is None else arguments.name
@@ -40,8 +40,8 @@ def template_files(arguments: Namespace, default_name: str, output: Path) -> dic
     if arguments.schema:
         text = f"# yaml-language-server: $schema={SCHEMA}\n{text}"
     files = {output: text}
-    for other in TEMPLATES[template][1]:
-        files[output.with_name(other)] = (FOLDER / other).read_text("utf-8")
+    for file_name in TEMPLATES[template][1]:
+        files[output.with_name(file_name)] = (FOLDER / file_name).read_text("utf-8")
     if arguments.schema:
         from tfcompose.cli.schemas import schema_text
 
@@ -50,12 +50,12 @@ def template_files(arguments: Namespace, default_name: str, output: Path) -> dic
 
 
 def has_demo(text: str) -> bool:
-    """Return whether a template starts without hardware only in its profile demo."""
+    """Return whether the template needs its profile demo to start without hardware."""
     return "\nprofiles:" in text
 
 
 def print_next(commands: Mapping[str, str]) -> None:
-    """Print the next commands with their purposes."""
+    """Print the next commands, each with its purpose."""
     width = max(map(len, commands))
     lines = [f"  {command:<{width}}  # {purpose}" for command, purpose in commands.items()]
     print("next:", *lines, sep="\n")

@@ -21,60 +21,61 @@ if TYPE_CHECKING:
     from tfcompose.compiler.render.text import CodeAddress
     from tfcompose.foundation.findings import Finding
 
-#: Exit codes: findings, or a process that failed; wrong use, what cannot be read, or what is not
-#: installed; and as a shell has them for a program that was ended by Ctrl-C, or by writing where
-#: nobody reads.
+#: Exit codes: 1 for findings or a failed process; 2 for wrong use, an unreadable file or a missing
+#: package; 130 for Ctrl-C and 141 for a closed output, as in a shell.
 FAILED, UNREADABLE, INTERRUPTED, OUTPUT_CLOSED = 1, 2, 130, 141
 
-#: A file that cannot be read; ROS or a package of it, trimesh, rosbags and eclipse-zenoh.
+#: Codes for an unreadable file, and for a missing package: ROS, trimesh, rosbags or eclipse-zenoh.
 _LACKING = frozenset({"TF001", "TF901", "TF905", "TF906", "TF920"})
 
-#: Control sequences (ECMA-48): those that end in m set colours, the others do something; and
-#: titles and links.
+#: Control sequences (ECMA-48), titles and links. A sequence that ends with m sets colours.
 _SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?|\033[ -/]*[0-~])")
-#: What clears the screen, and the line in which the cursor is.
+#: Control sequences that clear the screen, and the cursor's line.
 CLEAR, CLEAR_LINE = "\033[H\033[2J", "\r\033[K"
 _COLOUR = re.compile(r"\033\[[0-9;:]*m")
 
 
 def warn(message: str) -> None:
-    """Print one sentence to stderr, with control characters in names escaped."""
+    """Print a sentence on stderr. Control characters in names are escaped."""
     text = "\n".join(map(printable, message.split("\n")))
     sys.stderr.write(f"tfcompose: {text}\n")
 
 
 def fail(message: str, code: int = FAILED) -> NoReturn:
-    """Print one sentence to stderr and end the command.
+    """Print a sentence on stderr and end the command.
 
     Raises:
-        SystemExit: with the exit code.
+        SystemExit: always, with the exit code.
     """
     warn(message)
     raise SystemExit(code)
 
 
-#: So many findings of one code are printed of a file, unless all are requested.
+#: Maximum number of findings with the same code for a file, unless the user requests all.
 MOST_OF_ONE_CODE = 10
 
 
 def print_findings(
     findings: Sequence[Finding], stream: TextIO, *, most: int | None = None
 ) -> None:
-    """Print findings with the lines that they are about.
+    """Print findings, each with the line of the file that it is about.
 
-    At most ``most`` of one code per file, with the number of the others; None: all.
+    For each file, print at most ``most`` findings with the same code, then the number of the
+    others. None prints all.
     """
     from tfcompose.cli.reading import line_of
 
-    shown: list[Finding] = []
+    printed: list[Finding] = []
     counts: Counter[tuple[str, str]] = Counter()
     for finding in findings:
         place = (finding.span.file if finding.span else "", finding.code)
         counts[place] += 1
         if most is None or counts[place] <= most:
-            shown.append(finding)
+            printed.append(finding)
     stream.write(
-        render_text(shown, line_of, colour=is_coloured(stream), address_of=code_addresses(stream))
+        render_text(
+            printed, line_of, colour=is_coloured(stream), address_of=code_addresses(stream)
+        )
     )
     for (file, code), count in counts.items():
         if most is not None and count > most:
@@ -83,24 +84,24 @@ def print_findings(
 
 
 def reject(findings: Sequence[Finding], code: int | None = None) -> NoReturn:
-    """Print findings to stderr and end the command.
+    """Print findings on stderr and end the command.
 
     Raises:
-        SystemExit: with the given exit code, else that of ``exit_code_of``.
+        SystemExit: always, with ``code`` or else the result of ``exit_code_of``.
     """
     print_findings(findings, sys.stderr, most=MOST_OF_ONE_CODE)
     raise SystemExit(code or exit_code_of(findings))
 
 
 def exit_code_of(findings: Sequence[Finding]) -> int:
-    """Return 2 if the command lacks a file, ROS or a package, else 1."""
+    """Return 2 if a file, ROS or a package is missing, otherwise 1."""
     return UNREADABLE if any(finding.code in _LACKING for finding in findings) else FAILED
 
 
 def is_coloured(stream: TextIO) -> bool:
-    """Return whether to colour: on a terminal, or with FORCE_COLOR.
+    """Return whether to print colours: on a terminal, or with FORCE_COLOR.
 
-    Never with NO_COLOR (no-color.org).
+    With NO_COLOR (no-color.org), the result is always False.
     """
     if os.environ.get("NO_COLOR"):
         return False
@@ -108,24 +109,26 @@ def is_coloured(stream: TextIO) -> bool:
 
 
 def can_redraw(stream: TextIO) -> bool:
-    """Return whether lines can be redrawn in place: on a terminal that can move its cursor."""
+    """Return whether lines can be redrawn in place, as on a terminal with cursor movement."""
     return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
-#: Where the project publishes the pages that ``help --html`` writes; empty: nowhere.
+#: The URL where the project publishes the pages of ``help --html``. Empty means that they are not
+#: published.
 DOCUMENTATION_URL = ""
 
 
 def code_page(code: str) -> str:
-    """Return the path of a code's page below the address of the documentation."""
+    """Return the path of a code's page, relative to the address of the documentation."""
     return f"codes/{code}.html"
 
 
 def code_addresses(stream: TextIO) -> CodeAddress:
-    """Return the function from a code to the address of its page, for links on a terminal.
+    """Return a function that maps a code to its page's address, for links on a terminal.
 
-    The pages are at ``$TFCOMPOSE_DOCS``, a URL or a folder, or at the project's own address.
-    Files, pipes, NO_COLOR and pages missing from a folder get no links.
+    The pages are at ``$TFCOMPOSE_DOCS`` (a URL or a folder), or at the project's own address.
+    There are no links in files and pipes, with NO_COLOR, and to pages that the folder does not
+    contain.
     """
     docs = _documentation()
     if not docs or os.environ.get("NO_COLOR") or not can_redraw(stream):
@@ -143,7 +146,7 @@ def code_addresses(stream: TextIO) -> CodeAddress:
 
 
 def code_url(code: str) -> str:
-    """Return the URL of a code's page; empty if the pages are in a folder, or unpublished."""
+    """Return the URL of a code's page, empty if the pages are in a folder or not published."""
     from urllib.parse import quote
 
     docs = _documentation()
@@ -156,18 +159,18 @@ def _documentation() -> str:
     return os.environ.get("TFCOMPOSE_DOCS") or DOCUMENTATION_URL
 
 
-#: The beginning of a URL, and the characters that need no escape in it (RFC 3986).
+#: The beginning of a URL, and the characters that need no escape in a URL (RFC 3986).
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")
 _URL_SAFE = ":/?#[]@!$&'()*+,;=%~"
 
 
 def table_width(stream: TextIO) -> int | None:
-    """Return the terminal's width, to fit tables; None for a file or a pipe."""
+    """Return the terminal's width in columns for tables, None for a file or a pipe."""
     return size_of(stream.fileno())[0] if can_redraw(stream) else None
 
 
 def size_of(fd: int) -> tuple[int, int]:
-    """Return the terminal's columns and rows, 80 and 24 if there is none."""
+    """Return the terminal's columns and rows, (80, 24) without a terminal."""
     try:
         size = os.get_terminal_size(fd)
     except OSError:
@@ -176,20 +179,20 @@ def size_of(fd: int) -> tuple[int, int]:
 
 
 def printable(text: str) -> str:
-    """Return the text without sequences that would move the cursor."""
+    """Return the text without control characters, so that it cannot move the cursor."""
     return mask_invisible(text, "?")
 
 
 def plain(text: str) -> str:
     """Return the text without control sequences.
 
-    Other invisible characters are marked.
+    Marks replace other invisible characters.
     """
     return "".join(map(_mark, _SEQUENCE.split(text)[::2]))
 
 
 def keep_colours(text: str) -> str:
-    """Return the text with its colours, reset at the end, and no other control sequences."""
+    """Return the text with its colours, but without other control sequences; reset at the end."""
     pieces = _SEQUENCE.split(text)
     if len(pieces) == 1:
         return _mark(text)
@@ -206,13 +209,13 @@ def _mark(text: str) -> str:
 def has_reader(stream: TextIO) -> bool:
     """Return whether the stream still has a reader.
 
-    In ``tfcompose logs -f | head -1`` it is gone after one line.
+    In ``tfcompose logs -f | head -1``, the reader is gone after a line.
     """
     return _first_ready(stream, None, 0) != stream
 
 
 def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
-    """Wait until there is input, or the stream has lost its reader.
+    """Wait until the connection has input, or the stream has lost its reader.
 
     Return whether the stream has a reader. The connection's timeout limits the wait.
     """
@@ -225,14 +228,14 @@ def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
 def _first_ready(
     stream: TextIO, connection: socket.socket | None, timeout_ms: float | None
 ) -> object:
-    """Return the stream if it lost its reader, else the connection if it has input."""
+    """Return the stream if its reader is gone, else the connection if it has input."""
     poll = select.poll()
-    with suppress(OSError):  # it has no descriptor: nobody can leave
+    with suppress(OSError):  # a stream without a descriptor cannot lose its reader
         poll.register(stream.fileno(), 0)
     if connection:
         poll.register(connection, select.POLLIN)
-    found = [fd for fd, _ in poll.poll(timeout_ms)]
-    if connection and connection.fileno() in found:
-        found.remove(connection.fileno())
-        return stream if found else connection
-    return stream if found else None
+    ready = [fd for fd, _ in poll.poll(timeout_ms)]
+    if connection and connection.fileno() in ready:
+        ready.remove(connection.fileno())
+        return stream if ready else connection
+    return stream if ready else None

@@ -1,7 +1,7 @@
 """Commands and options of tools, for the parser, the help and the completion.
 
-Built-in tools are looked up first. Those of other packages are looked up only if a command or an
-option is still unknown, and for the help.
+Built-in tools are searched first. Tools of other packages are searched only for an unknown command
+or option, and for the help.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ToolCommand:
-    """A tool's command; its module is loaded when its help or its options are needed."""
+    """A tool's command. Its module is imported when its help or its options are needed."""
 
     def __init__(self, tool: Tool, command: Command) -> None:
         self.tool = tool
@@ -38,7 +38,7 @@ class ToolCommand:
         self._module().arguments(parser)
 
     def run(self, arguments: Namespace, /) -> int:
-        """Run it and return the exit code."""
+        """Run the command and return the exit code."""
         return int(self._module().run(arguments))
 
     def _module(self) -> Any:
@@ -59,7 +59,7 @@ class ToolOption:
     def run(self, command: str, arguments: Namespace) -> int | None:
         """Run the command with these options, and return the exit code.
 
-        None: the command should run as usual.
+        Return None if the command should run as usual.
         """
         code: int | None = _load_module(self.tool, self.option.module).run(command, arguments)
         return code
@@ -69,7 +69,7 @@ def _load_module(tool: Tool, module: str) -> Any:
     """Return a module of a tool.
 
     Raises:
-        SystemExit: after reporting that it cannot be loaded.
+        SystemExit: after an error message, if the module cannot be imported.
     """
     try:
         return load(module)
@@ -92,7 +92,7 @@ def _load_module(tool: Tool, module: str) -> Any:
 
 
 def summary_of(command: CommandModule) -> str:
-    """Return the purpose of a command in one line, without a full stop."""
+    """Return a line about the purpose of a command, without a full stop."""
     if isinstance(command, ToolCommand):
         return command.command.summary
     return (command.__doc__ or "").partition("\n")[0].removesuffix(".")
@@ -112,7 +112,7 @@ def find(name: str) -> ToolCommand | None:
     return None
 
 
-#: What other programs call a command of the core, and what to type instead.
+#: Names of commands in other programs, and the corresponding commands of the core.
 _SYNONYMS = {
     "check": "lint",
     "create": "init",
@@ -130,14 +130,14 @@ _SYNONYMS = {
 
 
 def instead_of(name: str) -> str:
-    """Return advice for another program's name of a command; empty if there is none."""
+    """Return advice for a command name from another program, empty for other names."""
     of_tools = (pair for _, command in installed_tools().commands() for pair in command.synonyms)
     command = (_SYNONYMS | dict(of_tools)).get(name)
     return f"that is tfcompose {command}" if command else ""
 
 
 def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOption]:
-    """Add the options of tools to a command, if an unknown option is used.
+    """If the line has an unknown option, add the options of tools to the command.
 
     Return the added options.
     """
@@ -152,19 +152,19 @@ def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOpti
 
 
 def add_all_options(name: str, parser: Parser) -> list[ToolOption]:
-    """Add the options of all installed tools to a command."""
+    """Add the options of all installed tools to a command. Return the added options."""
     return _add(name, parser, installed_tools(), ())
 
 
 def _add(
     name: str, parser: Parser, toolset: Toolset, before: Iterable[ToolOption]
 ) -> list[ToolOption]:
-    known = {option.option for option in before}
+    names = {option.option for option in before}
     added = [
         ToolOption(tool, option)
         for tool in toolset.tools
         for option in tool.options
-        if name in option.commands and option not in known
+        if name in option.commands and option not in names
     ]
     for option in added:
         option.arguments(parser)
@@ -172,10 +172,10 @@ def _add(
 
 
 def _refuse_absent(parser: Parser, argv: Sequence[str]) -> None:
-    """Refuse an option of a built-in tool that is not installed.
+    """Reject an option of a built-in tool that is not installed.
 
     Raises:
-        SystemExit: after reporting how to install it.
+        SystemExit: after an error message that tells how to install the tool.
     """
     if not parser.lacks_option(argv):
         return
@@ -185,7 +185,7 @@ def _refuse_absent(parser: Parser, argv: Sequence[str]) -> None:
 
 
 def report_problems() -> None:
-    """Print problems of tools in other packages."""
+    """Print problems of tools from other packages."""
     problems = installed_tools().problems
     if problems:
         from tfcompose.cli.terminal import print_findings

@@ -1,7 +1,7 @@
-"""``lint --untrusted``: limits untrusted robot files to their own tree, packages and presets.
+"""``lint --untrusted`` limits a robot file to its own tree, packages and presets.
 
-A pull request then reveals nothing about the computer that checks it: neither other files nor the
-environment, which in CI contains secrets.
+Then a pull request reveals nothing about the computer that checks it: no other files, and no
+environment variables, which in CI contain secrets.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve import Disk
     from tfcompose.spec.load import Source
 
-#: Variables that programs need to run and to write to a terminal, and where packages are.
+#: Variables that programs need to run, to write to a terminal, and to find packages.
 _NEEDED = frozenset(
     {
         "AMENT_PREFIX_PATH",
@@ -50,7 +50,7 @@ _NEEDED = frozenset(
         "TMPDIR",
     }
 )
-#: A value that is no secret: a switch or a number.
+#: A value that cannot be a secret: a switch or a number.
 _PLAIN = re.compile(r"true|false|yes|no|on|off|[-+]?[0-9]{0,9}(?:\.[0-9]{0,9})?", re.IGNORECASE)
 
 
@@ -58,7 +58,7 @@ _PLAIN = re.compile(r"true|false|yes|no|on|off|[-+]?[0-9]{0,9}(?:\.[0-9]{0,9})?"
 def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
     """Remove all environment variables from this process except those that programs need.
 
-    Yield all the original ones.
+    Yield all the original variables.
     """
     before = dict(os.environ)
     if applies:
@@ -71,10 +71,10 @@ def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
 
 
 def declared_variables(source: Source, environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the variables that a file's args read, if their values cannot be secrets.
+    """Return the variables that the file's args read, if the values cannot be secrets.
 
-    The value must be one of the declared choices, a switch or a number: an untrusted file may
-    declare an argument for any variable, and findings quote values.
+    A value must be one of the declared choices, a switch or a number. The reason is that an
+    untrusted file may declare an argument for any variable, and findings quote values.
     """
     declared: dict[str, str] = {}
     for spec in source.mapping("args").values():
@@ -91,11 +91,11 @@ def _choices(spec: Mapping[str, Any]) -> Sequence[str]:
 
 
 class UntrustedFiles:
-    """Files that an untrusted file may read; all others are refused, or missing.
+    """Files that an untrusted file may read. All other files are rejected, or missing.
 
     Args:
         file: the robot file or URDF.
-        read: reads a file that may be read.
+        read: returns the text of a file that may be read.
     """
 
     def __init__(self, file: str, read: Callable[[str], str]) -> None:
@@ -112,7 +112,7 @@ class UntrustedFiles:
         """Return the text of a file.
 
         Raises:
-            RejectedError: if it must not or cannot be read.
+            RejectedError: if the file must not be read, or cannot be read.
         """
         if path != STDIN and not self.reach.allows(path):
             withhold(path)
@@ -129,7 +129,7 @@ class UntrustedFiles:
         return self.reach.allows(path) and is_folder(path)
 
     def disk(self) -> Disk:
-        """Return the compiler's access to files, without measuring meshes."""
+        """Return the compiler's access to files. It does not measure meshes."""
         return replace(
             self._disk,
             read=self.read,
@@ -140,7 +140,7 @@ class UntrustedFiles:
         )
 
     def disk_for(self, source: Source) -> Disk:
-        """Return the same for a robot file, which may read packages under ``packages``."""
+        """Return the compiler's access for a robot file, which may also read its ``packages``."""
         for name, folder in source.mapping("packages").items():
             if isinstance(folder, str):
                 path = find_path(folder, source.span_of(("packages", name)))
@@ -149,5 +149,5 @@ class UntrustedFiles:
         return self.disk()
 
     def library(self) -> Library:
-        """Return the presets that may be read."""
+        """Return the library of presets that may be read."""
         return Library((str(PRESETS),), PresetFolders(self.read, self.reach.allows), str(PRESETS))

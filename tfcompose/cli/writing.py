@@ -1,4 +1,4 @@
-"""Atomic writes: of one file, or of all files of a robot together."""
+"""Atomic writes of a single file, or of all files of a robot together."""
 
 from __future__ import annotations
 
@@ -31,14 +31,29 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Asset, Robot
 
 
+_PNG_PACKAGES = ("resvg_py", "font_lato")
+
+
+def require_png_packages() -> None:
+    """Refuse a picture as PNG before doing any work for it, if its packages are missing.
+
+    Raises:
+        SystemExit: after reporting one.
+    """
+    missing = [package for package in _PNG_PACKAGES if find_spec(package) is None]
+    if missing:
+        advice = "pip install 'tfcompose[pictures]'; svg needs nothing"
+        fail(f"PNG needs the package {missing[0]}: {advice}", UNREADABLE)
+
+
 def replace_file(path: Path, data: bytes) -> None:
     """Write the file atomically.
 
-    A concurrent reader sees the old file. Mode and owner stay. A device, a pipe or a symbolic link
-    is written through.
+    A concurrent reader sees the old or the new file. Mode and owner stay. A device, a pipe or the
+    target of a symbolic link is written directly.
 
     Raises:
-        OSError: if it cannot be written; it is unchanged.
+        OSError: if the file cannot be written; the file is then unchanged.
     """
     before = path.stat() if exists(path) else None
     if path.is_symlink() or (before and not stat.S_ISREG(before.st_mode)):
@@ -52,7 +67,7 @@ def replace_file(path: Path, data: bytes) -> None:
             stream.flush()
             os.fsync(stream.fileno())
             if before:
-                with contextlib.suppress(PermissionError):  # another's file, in a folder of ours
+                with contextlib.suppress(PermissionError):  # the file of another user
                     os.fchown(stream.fileno(), before.st_uid, before.st_gid)
             os.fchmod(
                 stream.fileno(), stat.S_IMODE(before.st_mode) if before else 0o666 & ~_umask()
@@ -71,15 +86,16 @@ def _umask() -> int:
 
 
 def write_all(folder: Path, files: Sequence[File], earlier: Iterable[str] = ()) -> None:
-    """Write files below ``folder``, such as those of a build.
+    """Write files below ``folder``, such as the files of a build.
 
-    A reader sees each file old or new, never partial. All are first written to a folder beside it.
-    Only after the last byte is on the disk are they moved into place, which needs no more space;
-    if one cannot be moved, those before it are restored. Parameter files of an earlier build that
-    are not among the files are removed, and so are those in ``earlier``.
+    A reader sees each file old or new, never partial. All files are first written to a folder
+    inside ``folder``. After the last byte is on the disk, the files are moved into place, which
+    needs no further space. If a file cannot be moved, the files before it are restored. Parameter
+    files of an earlier build, and the files in ``earlier``, are removed if they are not among the
+    new files.
 
     Raises:
-        OSError: if the files cannot be written; nothing has changed.
+        OSError: if the files cannot be written; then nothing has changed.
     """
     made = [parent for parent in (folder, *folder.parents) if not exists(parent)]
     before = [*_parameter_files(folder), *earlier]
@@ -101,13 +117,13 @@ def write_all(folder: Path, files: Sequence[File], earlier: Iterable[str] = ()) 
 
 
 def create_folder(folder: Path, files: Iterable[File]) -> None:
-    """Create a folder with these files, all or nothing; an empty folder may exist.
+    """Create a folder with all of the files, or not at all. An empty folder may exist.
 
-    The files are first written to a hidden folder beside it, which becomes the folder at once.
+    The files are first written to a hidden folder next to it, which is then renamed.
 
     Raises:
         FileExistsError: if a file, or a folder that is not empty, has this name.
-        OSError: if the files cannot be written; nothing has changed.
+        OSError: if the files cannot be written; then nothing has changed.
     """
     made = [parent for parent in folder.parents if not exists(parent)]
     try:
@@ -126,10 +142,10 @@ def create_folder(folder: Path, files: Iterable[File]) -> None:
 
 
 def _rename_to_absent(new: Path, folder: Path) -> None:
-    """Rename a folder; an empty one of the new name is replaced.
+    """Rename a folder. An empty folder with the new name is replaced.
 
     Raises:
-        FileExistsError: if something else has the name.
+        FileExistsError: if another file or folder has the new name.
     """
     try:
         new.rename(folder)
@@ -140,9 +156,9 @@ def _rename_to_absent(new: Path, folder: Path) -> None:
 
 
 def _move(staging: Path, folder: Path, paths: list[str]) -> None:
-    """Move the files into place, all or none.
+    """Move all files into place, or none.
 
-    Replaced files are kept until the last one is in place.
+    Replaced files are kept until the last file is in place.
     """
     made = [
         parent for parent in {(folder / path).parent: None for path in paths} if not exists(parent)
@@ -169,9 +185,9 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
 
 
 def _back_up(target: Path, old: Path) -> None:
-    """Keep the old file under another name while a new one replaces it.
+    """Keep the old file under another name while a new file replaces it.
 
-    A copy if it cannot be linked.
+    If the file cannot be linked, it is copied.
     """
     with contextlib.suppress(OSError):
         if not target.is_symlink():
@@ -202,7 +218,7 @@ def _write_to_disk(path: Path, text: str) -> None:
 
 
 def _parameter_files(folder: Path) -> list[str]:
-    """Return the parameter files in the folder's plan, which an earlier build wrote."""
+    """Return the parameter files of an earlier build, from the plan in the folder."""
     if not is_folder(folder / "params"):
         return []
     try:
@@ -229,7 +245,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
     """Build the robot; return the folder, the file names and the printed warnings.
 
     Raises:
-        SystemExit: after reporting why nothing was written.
+        SystemExit: after an error message; then nothing was written.
     """
     reads_back = getattr(arguments, "read_back", False)
     if reads_back and find_spec("yourdfpy") is None:
@@ -262,15 +278,15 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
 
 
 def _source_file(folder: Path) -> Path:
-    """Return the file that records the robot file's path, beside a folder with the robot's name.
+    """Return the file next to the folder that contains the path of the robot file.
 
-    Two robots may have one name.
+    Two robot files may have the same robot name, and so the same folder.
     """
     return folder.with_name(f".{folder.name}.source")
 
 
 def _other_source(folder: Path, file: str) -> Path | None:
-    """Return the other robot file that the folder was built from, if it still exists."""
+    """Return the other robot file from which the folder was built, None if it no longer exists."""
     with contextlib.suppress(OSError, ValueError):
         before = folder / os.fsdecode(_source_file(folder).read_bytes()).removesuffix("\n")
         if not before.samefile(file):
@@ -279,14 +295,14 @@ def _other_source(folder: Path, file: str) -> Path | None:
 
 
 def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:
-    """Return the folder to build the robot in, and the form of addresses in its files."""
+    """Return the folder for the robot's files, and the form of addresses in these files."""
     folder = Path(arguments.output) if arguments.output else Path("build") / robot.name
     form: Form = getattr(arguments, "mesh", "as-written")
     return folder, Target(form, folder.as_posix(), Path.cwd().as_posix())
 
 
 def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Finding]:
-    """Return the differences between URDFs read back and the robot."""
+    """Return the differences between the robot and its URDFs, which are read back."""
     from tfcompose.compiler.urdf.read_back import differences
 
     texts = {file.path: file.text for file in files}
@@ -306,7 +322,7 @@ def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Fi
 
 
 def _without_address(asset: Asset, form: Form) -> Finding:
-    """Return the finding for a file that has no address of the requested form."""
+    """Return the finding about a file that has no address in the requested form."""
     if form != "package":
         return finding(
             "TF724",

@@ -1,4 +1,4 @@
-"""All steps from text to files, on one screen."""
+"""All steps from the text of a robot file to the built files."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ NOTHING = BuildInputs()
 class Compiled:
     """A robot and all findings about it."""
 
-    #: None if the text did not get that far.
+    #: None if the text has errors that prevent a robot.
     robot: Robot | None
     findings: tuple[Finding, ...]
-    #: The comments that silence findings.
+    #: All comments that silence findings.
     allows: tuple[Allow, ...] = ()
-    #: Those of ``allows`` that silenced a finding, with its code.
+    #: The comments in ``allows`` that silenced a finding, each with the finding's code.
     used: frozenset[tuple[Allow, str]] = frozenset()
-    #: The robot's own source, with overlays merged over it, and those of robot files that are
+    #: The robot's source with overlays merged, followed by the sources of robot files that are
     #: parts.
     sources: tuple[Source, ...] = ()
 
@@ -60,11 +60,12 @@ def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
     disk: Disk | None = None,
     inputs: BuildInputs = NOTHING,
 ) -> Compiled:
-    """Return the robot with profiles and overlays merged, and all findings by place.
+    """Return the robot with profiles and overlays merged, and all findings sorted by place.
 
-    ``read`` returns the text of an included file or a calibration; without it no file can be read.
-    ``disk`` tells which files and packages exist; without it meshes are not looked up. ``inputs``
-    has the values of the robot's arguments and the environment, which is empty by default.
+    ``read`` returns the text of an included file or a calibration. Without ``read`` no other file
+    can be read. ``disk`` tells which files and packages exist. Without ``disk`` meshes are not
+    looked up. ``inputs`` holds the values of the robot's arguments and the environment, which is
+    empty by default.
     """
     try:
         source = load(text, file)
@@ -83,7 +84,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     disk: Disk | None = None,
     inputs: BuildInputs = NOTHING,
 ) -> Compiled:
-    """Return the result of ``compile_robot`` for a text that is loaded, with its includes."""
+    """Compile a loaded text with its includes; otherwise like ``compile_robot``."""
     try:
         validated = validate(
             compose(source, profiles, overlays, inputs, read), profiles_in(source), inputs
@@ -108,9 +109,9 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
 
 
 def _check_robot(robot: Robot, off: Collection[str]) -> list[Finding]:
-    """Return the findings of the rules, including those of the tools it uses.
+    """Return the findings of all rules, including rules of the tools that the robot uses.
 
-    Rules whose codes are ``off`` are not asked.
+    Rules whose codes are ``off`` do not run.
     """
     of_tools, findings = rules_of_tools(robot)
     return [

@@ -1,7 +1,7 @@
-"""Bounding boxes of mesh files: STL, OBJ and COLLADA, read without a library.
+"""Bounding boxes of mesh files (STL, OBJ and COLLADA), read without a library.
 
-Rules use them to detect the unit of a file. A sample of a large file is enough for that, and saves
-the time to import numpy.
+Rules use the boxes to detect the unit of a file. For that, a sample of a large file is enough, and
+it saves the time to import numpy.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import Shape
 
-#: The least and the greatest x, y, z.
+#: The minimum and maximum of x, y and z.
 Corners = tuple["Vector", "Vector"]
 
 _MOST_BYTES = 100_000_000
 _HEAD, _COUNT, _TRIANGLE = 80, struct.Struct("<I"), struct.Struct("<12x9f2x")
 _BODY = _HEAD + _COUNT.size
-#: The largest number of triangles of an STL that are read, evenly spread.
+#: Maximum number of triangles to read from an STL file, evenly spread over the file.
 _MOST_TRIANGLES = 5_000
 _NUMBER = rb"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _STL_VERTEX = re.compile(rb"\bvertex\s+(%b)\s+(%b)\s+(%b)" % (_NUMBER, _NUMBER, _NUMBER))
@@ -41,9 +41,9 @@ _DEEPEST = 50
 
 
 def size_of(shape: Shape) -> Vector | None:
-    """Return the lengths of the shape's bounding box along its axes, in metres.
+    """Return the side lengths of the shape's bounding box along the shape's axes, in metres.
 
-    None: a mesh whose file is missing, cannot be read, or has another format.
+    None for a mesh whose file is missing, unreadable, or in another format.
     """
     match shape.kind:
         case "box":
@@ -67,9 +67,9 @@ def size_of(shape: Shape) -> Vector | None:
 
 @lru_cache(maxsize=512)
 def mesh_box(path: str) -> Corners | None:
-    """Return the box around a mesh, in metres at a scale of 1.
+    """Return the bounding box of a mesh at scale 1, in metres.
 
-    None: the file cannot be read, has another format, or has no vertices.
+    None if the file is unreadable, has another format, or has no vertices.
     """
     read = _READERS.get(path.rpartition(".")[2].lower())
     try:
@@ -77,7 +77,7 @@ def mesh_box(path: str) -> Corners | None:
             return None
         return read(Path(path).read_bytes())
     except (OSError, ValueError, ArithmeticError, LookupError, TypeError, ET.ParseError):
-        return None  # a broken mesh is the finding of those who need its triangles
+        return None  # code that needs the triangles reports the broken mesh
 
 
 def _around(points: Iterable[Vector]) -> Corners | None:
@@ -93,7 +93,7 @@ def _stl(data: bytes) -> Corners | None:
     if not count or _BODY + _TRIANGLE.size * count != len(data):
         return _around(_vertices(_STL_VERTEX, data))
     step = -(-count // _MOST_TRIANGLES) * _TRIANGLE.size
-    triangles = (_TRIANGLE.unpack_from(data, at) for at in range(_BODY, len(data), step))
+    triangles = (_TRIANGLE.unpack_from(data, offset) for offset in range(_BODY, len(data), step))
     return _around(numbers[i : i + 3] for numbers in triangles for i in (0, 3, 6))
 
 
@@ -107,9 +107,9 @@ def _vertices(pattern: re.Pattern[bytes], data: bytes) -> Iterator[Vector]:
 
 
 def _collada(data: bytes) -> Corners | None:
-    """Return the box of the geometries, as the scene places them, in metres.
+    """Return the box around the geometries as the scene places them, in metres.
 
-    The up_axis is ignored, as RViz and Gazebo do.
+    ``up_axis`` is ignored, as in RViz and Gazebo.
     """
     if b"<!ENTITY" in data:
         return None
@@ -128,12 +128,12 @@ def _collada(data: bytes) -> Corners | None:
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """The elements of a COLLADA file by the addresses that others name them with."""
+    """The elements of a COLLADA file, by the identifiers that other elements refer to."""
 
     elements: Mapping[str, ET.Element]
 
     def points_of(self, node: ET.Element, depth: int = 0) -> list[Vector]:
-        """Return points around the node's meshes, in the frame of its parent."""
+        """Return corner points around the node's meshes, in the frame of the node's parent."""
         if depth > _DEEPEST:
             return []
         points: list[Vector] = []
@@ -161,7 +161,7 @@ class _Scene:
         return [point for mesh in geometry.iter("mesh") for point in self.corners(mesh)]
 
     def corners(self, mesh: ET.Element) -> list[Vector]:
-        """Return the eight corners of the box around a mesh's vertices, none without vertices."""
+        """Return the eight corners of the box around a mesh's vertices; empty without vertices."""
         numbers: list[float] = []
         for position in mesh.iterfind("vertices/input[@semantic='POSITION']"):
             source = self.elements.get(position.get("source", ""))
@@ -202,7 +202,7 @@ def _by_rotation(values: list[float], point: Vector) -> Vector:
     return rotate(quat_from_axis_angle((x, y, z), math.radians(degrees)), point)
 
 
-#: Transformations of a node's contents, by tag.
+#: Functions that transform a node's content, by the tag of the transformation.
 _MOVES: dict[str, Callable[[list[float], Vector], Vector]] = {
     "matrix": _by_matrix,
     "translate": _by_translation,

@@ -12,19 +12,19 @@ import trimesh
 if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
 
-#: A COLLADA file declares its unit in its head, before the first geometry.
+#: Number of bytes to search for the unit, which a COLLADA file declares before its first geometry.
 _HEAD = 65_536
 _UNIT = re.compile(rb"""<unit\b[^>]*\bmeter\s*=\s*["']\s*([0-9.eE+-]+)""")
 
 
 def read_mesh(path: str, scale: Vector) -> Any:
-    """Return the mesh of a file at a scale, a ``trimesh.Trimesh``.
+    """Return the mesh of a file at a scale, as a ``trimesh.Trimesh`` in metres.
 
-    A COLLADA file is in the unit that it declares, as in RViz and Gazebo. Like them, this ignores
-    up_axis.
+    Lengths in a COLLADA file are in the file's declared unit, as in RViz and Gazebo. ``up_axis``
+    is ignored, as in RViz and Gazebo.
 
     Raises:
-        Exception: any exception of a reader, for a file that is no mesh.
+        Exception: any exception of trimesh's readers, if the file is not a mesh.
     """
     mesh: Any = trimesh.load(path, force="mesh")
     unit = _collada_unit(path)
@@ -33,9 +33,9 @@ def read_mesh(path: str, scale: Vector) -> Any:
 
 
 def _collada_unit(path: str) -> float:
-    """Return the metres in the unit of a COLLADA file.
+    """Return the length of a COLLADA file's unit in metres.
 
-    1 where it declares none, and for other files.
+    1 if the file declares no unit or has another format.
     """
     if not path.lower().endswith(".dae"):
         return 1.0

@@ -1,4 +1,4 @@
-"""Provenance of an edge: the places of the values that make it up."""
+"""Provenance of an edge: the places of the values that determine it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge
     from tfcompose.spec.load import Path, Source
 
-#: Keys that set where an edge is, and who sends it.
+#: Keys that set the pose or the owner of an edge.
 _KEYS = (
     *(
         "parent",
         "child",
         "type",
         "axis",
+        "offset",
         "xyz",
         "rpy",
         "quat_xyzw",
@@ -29,10 +30,10 @@ _KEYS = (
 
 
 def values_of(edge: Edge, sources: Sequence[Source]) -> list[str]:
-    """Return a line for each value that makes up the edge.
+    """Return a line for each value that determines the edge.
 
-    Key, value, place, and the places of the values it replaced. ``sources`` are the robot's own
-    and those of its parts.
+    A line has key, value, place, and the places of the values that this value replaced.
+    ``sources`` are the sources of the robot and of its parts.
     """
     lines = []
     for source, path, value in _given_values(edge, sources):
@@ -52,9 +53,9 @@ def _given_values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Sourc
 
 
 def _entries(edge: Edge, source: Source) -> Iterator[Path]:
-    """Yield where the edge may be given.
+    """Yield the paths of entries that may define the edge.
 
-    In a part without the prefix that its names have in the robot.
+    Entries of a part lack the prefix that the part's names have in the robot.
     """
     named = (
         {"joints": edge.joint_name, "sensors": edge.sensor}
@@ -64,12 +65,12 @@ def _entries(edge: Edge, source: Source) -> Iterator[Path]:
     for section, name in (named | dict.fromkeys(("frames", "links", "parts"), edge.child)).items():
         entries = source.mapping(section)
         ends = (name[begin:] for begin in range(len(name) + 1))
-        known = (
+        names = (
             sorted(entries, key=len, reverse=True)
             if section == "parts"
             else filter(entries.__contains__, ends)
         )
-        for entry in known:
+        for entry in names:
             yield (section, entry) if edge.declared else (section, entry, "frames", edge.child)
 
 

@@ -1,11 +1,11 @@
-"""The catalogue of findings: one Markdown file a code, with its name, family, severity and page.
+"""The catalogue of findings: a Markdown file for each code, with name, family, severity and page.
 
-A file is ``CODE.md``: a head of ``key: value`` lines between two lines ``---``, and below it the
-page that ``tfcompose explain CODE`` prints: what is wrong, in a sentence; then why it matters and
-what to do. A code is never used again for something else.
+A file ``CODE.md`` begins with ``key: value`` lines between two lines ``---``. Below is the page
+that ``tfcompose explain CODE`` prints: the fault in a sentence, then its consequences and the
+remedy. A code is never reused for another meaning.
 
-Every process that can find something loads this module; a file is read when its code is first
-asked for. The codes of tools are in their folders, which are looked up after those of the core.
+Every process that can report findings loads this module. A file is read when its code is first
+needed. The codes of tools are in the tools' folders, which are searched after the core's folder.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 Severity = Literal["error", "warning"]
 
-#: Where a finding comes from. Codes of the guard are also found by ``doctor`` and ``verify``, on
-#: the live tree.
+#: The origin of a finding. ``doctor`` and ``verify`` also report the guard's codes, about the live
+#: tree.
 Family = Literal[
     "load",
     "language",
@@ -41,8 +41,8 @@ Family = Literal[
 FAMILIES: tuple[Family, ...] = get_args(Family)
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
-#: The families of tfcompose's own codes, by their first digit. Codes of TF8 say theirs, and so do
-#: those with another prefix.
+#: Families of tfcompose's codes, by their first digit. The files of TF8 codes, and of codes with
+#: another prefix, name the family.
 _BY_DIGIT: dict[str, Family] = {
     "0": "load",
     "1": "language",
@@ -58,11 +58,11 @@ _BY_DIGIT: dict[str, Family] = {
 _Member = TypeVar("_Member", bound=str)
 
 _DIGITS = 3
-#: The units of limits: what divides a number to give SI, and the unit of SI, or % for a part.
+#: Units of limits, each with the divisor that converts it to SI, and the SI unit; % is a fraction.
 _UNITS = {
     "m": (1.0, "m"),
     "cm": (100.0, "m"),
-    "deg": (57.29577951308232, "rad"),  # 180/π; to load math takes a tenth of this module's time
+    "deg": (57.29577951308232, "rad"),  # 180/π; importing math would be slow
     "%": (100.0, "%"),
 }
 _KEYS = frozenset({"name", "severity", "family", "unbuildable", "limit"})
@@ -70,34 +70,33 @@ _KEYS = frozenset({"name", "severity", "family", "unbuildable", "limit"})
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """One kind of finding."""
+    """A kind of finding."""
 
     code: str
     name: str
     family: Family
-    #: That of its findings, unless they say otherwise.
+    #: The default severity of its findings.
     severity: Severity
-    #: A robot cannot be built while the finding is there: no tree, an edge that nobody publishes,
-    #: a process that never starts.
+    #: Whether the finding prevents a build. Examples are a robot without a tree, an edge without a
+    #: publisher, and a process that never starts.
     unbuildable: bool = False
-    #: What ``rules`` can set instead: how far is too far, in SI, and whether it is a length (m),
-    #: an angle (rad) or a part (%).
+    #: The default of the limit that ``rules`` can set, in SI, and its unit: m, rad or %.
     limit: tuple[float, str] | None = None
 
     @property
     def can_be_allowed(self) -> bool:
-        """Whether a comment or an entry of ``rules`` may silence it.
+        """Whether a comment or an entry of ``rules`` may silence the finding.
 
-        A file that was not understood has no excuse.
+        A finding about a file that was not understood cannot be silenced.
         """
         return not self.unbuildable and self.family not in {"load", "language"}
 
 
 class Catalogue(Mapping[str, Code]):
-    """The codes whose files are in some folders, in alphabetical order."""
+    """The codes in a list of folders, in alphabetical order."""
 
     def __init__(self, *folders: Path, more: Callable[[], Iterable[Path]] = tuple) -> None:
-        """Take codes from folders, then from those that ``more`` returns when it is needed."""
+        """Use the codes in the folders, then those in folders that ``more`` returns on demand."""
         self._folders = folders
         self._more = more
         self._codes: dict[str, Code] = {}
@@ -105,26 +104,26 @@ class Catalogue(Mapping[str, Code]):
     def load(self) -> None:
         """Read every code of the core now.
 
-        A process that runs for long depends on no file later.
+        A process that runs for a long time then does not depend on the files.
         """
         for code in _codes_in(self._folders):
             self[code]
 
     def page(self, code: str) -> str:
-        """Return the page of a code, in Markdown.
+        """Return the page of a code in Markdown.
 
         Raises:
             KeyError: if there is no such code.
-            ValueError: if its file is not understood.
+            ValueError: if its file is invalid.
         """
         return _parts(code, self._text(code))[1].rstrip("\n")
 
     def summary(self, code: str) -> str:
-        """Return the first sentence of a code's page, on one line.
+        """Return the first sentence of a code's page on a single line.
 
         Raises:
             KeyError: if there is no such code.
-            ValueError: if its file is not understood.
+            ValueError: if its file is invalid.
         """
         return " ".join(self.page(code).partition("\n\n")[0].split())
 
@@ -140,7 +139,7 @@ class Catalogue(Mapping[str, Code]):
         return len(list(iter(self)))
 
     def _all_folders(self) -> Iterator[Path]:
-        """Yield the folders; those of ``more`` are looked up when the others are through."""
+        """Yield the folders, then the folders from ``more``, which is called only when reached."""
         yield from self._folders
         yield from self._more()
 
@@ -154,17 +153,16 @@ class Catalogue(Mapping[str, Code]):
 
 
 def _codes_in(folders: Iterable[Path]) -> set[str]:
-    """Return the codes whose pages are in the folders."""
+    """Return the codes with pages in the folders."""
     pages = {file.stem for folder in folders for file in folder.glob("*.md")}
     return {page for page in pages if _is_code(page)}
 
 
 def read_code(code: str, text: str) -> Code:
-    """Return the code that a file's text describes.
+    """Return the code that the text of a file describes.
 
     Raises:
-        ValueError: if the text has no head, or no page, or its head says something else than the
-        keys of a code.
+        ValueError: if the text has no head or no page, or the head has invalid keys or values.
     """
     head, _ = _parts(code, text)
     lines = [line.partition(": ") for line in head.splitlines()]
@@ -222,7 +220,7 @@ CATALOGUE = Catalogue(Path(__file__).parents[1] / "data" / "codes", more=code_fo
 
 
 def code_of(name: str) -> str | None:
-    """Return the code that a code in any case, or a name, means; None if there is none."""
+    """Return the code for a code in any case or for a name, None if unknown."""
     upper = name.upper()
     if upper in CATALOGUE:
         return upper
@@ -230,14 +228,14 @@ def code_of(name: str) -> str | None:
 
 
 def absent_code(name: str) -> str:
-    """Return what installs the tool that has a code, by that or by its name; empty if none has."""
+    """Return how to install the missing tool that has this code or name, "" without one."""
     return absent(name.upper(), "code") or absent(name, "rule")
 
 
 def similar_words(name: str) -> list[str]:
-    """Return the codes and names that an unknown word may be a slip of.
+    """Return the codes and names that are similar to an unknown word.
 
-    There are none for a whole code, as TF999 is.
+    Nothing is similar to a complete code such as TF999.
     """
     if _is_code(name.upper()):
         return []
@@ -245,5 +243,5 @@ def similar_words(name: str) -> list[str]:
 
 
 def can_be_allowed(code: str) -> bool:
-    """Return whether findings of the code can be silenced; those of an unknown code cannot."""
+    """Return whether findings with the code can be silenced. Unknown codes cannot."""
     return code in CATALOGUE and CATALOGUE[code].can_be_allowed

@@ -1,7 +1,7 @@
-"""Starts a confined process and talks to it: what it asks, what it answers, what it prints.
+"""Starts a sandboxed process and talks to it: its questions, its answer, and its output.
 
-Whatever comes from it is a stranger's: messages are bounded in size, and what it prints is cut. It
-has a session of its own, no terminal, and ends with its time or with this process.
+Data from the process are untrusted. Messages are limited in size, and its output is truncated. The
+process has its own session and no terminal. It ends after a time limit, or with this process.
 """
 
 from __future__ import annotations
@@ -22,39 +22,39 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 MOST_WALL_S: Final = 30.0
-#: With --trust: files may be on a disk that does not answer.
+#: Time limit with --trust, in seconds. Files may be on a slow disk.
 MOST_TRUSTED_WALL_S: Final = 600.0
 MOST_ANSWER_BYTES: Final = 64 << 20
 MOST_PRINTED_BYTES: Final = 1 << 20
-#: Lists and mappings of an answer: each takes memory that its text does not.
+#: Maximum number of lists and mappings in an answer, because each takes more memory than its text.
 _MOST_CONTAINERS: Final = 4_000_000
-#: Characters of a path or a name.
+#: Maximum number of characters of a path or a name in a question.
 _LONGEST_QUESTION: Final = 4096
 
 
-#: A question's answer: a message, and bytes that follow it.
+#: The reply to a question: a message and the bytes that follow it.
 Reply = tuple[Any, bytes]
 
 
 @dataclass(slots=True)
 class Outcome:
-    """How a confined process ended: with an answer, or without."""
+    """The end of a sandboxed process, with or without an answer."""
 
-    #: What it sent; None if it sent nothing.
+    #: The answer, None without one.
     answer: Any = None
-    #: Its exit code.
+    #: The exit code.
     code: int = 0
     timed_out: bool = False
-    #: Why it was ended because of what it sent; empty if it was not.
+    #: The reason if it was killed because of an invalid message; otherwise empty.
     refused: str = ""
-    #: What the kernel lacks to confine it.
+    #: Sandbox features that the kernel lacks.
     missing: tuple[str, ...] = ()
-    #: What it printed.
+    #: The output of the process.
     printed: str = ""
 
 
 class _RefusedError(Exception):
-    """A message is none, or is too large."""
+    """A message is invalid or too large."""
 
 
 def run_confined(  # noqa: PLR0913 (what a process needs)
@@ -66,11 +66,11 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
     shared: Sequence[int] = (),
     environment: Mapping[str, str] | None = None,
 ) -> Outcome:
-    """Run a module's ``main`` in a process of its own, and return how that ended.
+    """Run a module's ``main`` in a separate process, and return the outcome.
 
-    ``main`` is given the descriptors of its two pipes, then those that are ``shared``. It reads
-    the request, and sends mappings with one key: ``missing``, with what the kernel is missing,
-    then questions, whose keys ``answers`` has, then ``answer``.
+    ``main`` gets the descriptors of its two pipes, followed by the descriptors in ``shared``. It
+    reads the request and sends mappings with a single key: first ``missing``, with features that
+    the kernel lacks; then questions, whose keys are those of ``answers``; finally ``answer``.
     """
     reads, to_child = os.pipe()
     from_child, writes = os.pipe()
@@ -79,7 +79,7 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
     program += f"; main(*{inherited})"
     outcome, printed = Outcome(), bytearray()
     env = dict(os.environ if environment is None else environment)
-    env.pop("PYTHONPYCACHEPREFIX", None)  # a folder that it may not read
+    env.pop("PYTHONPYCACHEPREFIX", None)  # the process may not read that folder
     with (
         os.fdopen(to_child, "wb", buffering=0) as sink,
         os.fdopen(from_child, "rb") as source,
@@ -103,7 +103,7 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
         try:
             outcome.answer = _converse(source, sink, request, answers, outcome)
             if outcome.answer is None:
-                process.wait()  # its exit code says why
+                process.wait()  # the exit code tells the reason
         except _RefusedError as error:
             outcome.refused = str(error)
         finally:
@@ -116,10 +116,10 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
 
 
 def _module_path() -> list[str]:
-    """Return where modules are: not in the working folder, which python -m adds."""
-    own, here = str(Path(__file__).parents[2]), os.path.realpath("")
+    """Return Python's path without the working directory, which python -m adds."""
+    package_folder, here = str(Path(__file__).parents[2]), os.path.realpath("")
     paths = [path for path in sys.path if path and os.path.realpath(path) != here]
-    return paths if own in paths else [*paths, own]
+    return paths if package_folder in paths else [*paths, package_folder]
 
 
 def _end(process: subprocess.Popen[bytes], outcome: Outcome) -> None:
@@ -128,7 +128,7 @@ def _end(process: subprocess.Popen[bytes], outcome: Outcome) -> None:
 
 
 def _collect(stream: IO[bytes], printed: bytearray) -> None:
-    """Read a stream to its end, and keep the beginning."""
+    """Read a stream to its end, and keep only the beginning."""
     while chunk := os.read(stream.fileno(), 1 << 16):
         printed += chunk[: MOST_PRINTED_BYTES - len(printed)]
 
@@ -140,12 +140,12 @@ def _converse(
     answers: Mapping[str, Callable[[Any], Reply]],
     outcome: Outcome,
 ) -> Any:
-    """Return the answer to a request, None if the process ends before."""
+    """Return the answer to a request, None if the process ends without one."""
     _send(sink, request, b"")
-    is_first = True  # then nothing of a stranger's has run
+    is_first = True  # no untrusted code has run before the first message
     while message := _receive(source):
-        (key, value), *others = message.items()
-        if key == "answer" and not others:
+        (key, value), *rest = message.items()
+        if key == "answer" and not rest:
             return value
         if key == "missing" and is_first and fits(value, [str]):
             outcome.missing = tuple(value)
@@ -159,13 +159,13 @@ def _converse(
 
 def _send(sink: IO[bytes], message: Any, data: bytes) -> None:
     rest = memoryview(json.dumps(message).encode() + b"\n" + data)
-    with contextlib.suppress(BrokenPipeError):  # it has ended, and nothing more comes from it
+    with contextlib.suppress(BrokenPipeError):  # the process has ended
         while rest:
             rest = rest[sink.write(rest) :]
 
 
 def _receive(source: IO[bytes]) -> dict[str, Any] | None:
-    """Return the next message, None at the end."""
+    """Return the next message, None at the end of the stream."""
     line = source.readline(MOST_ANSWER_BYTES + 1)
     if len(line) > MOST_ANSWER_BYTES:
         raise _RefusedError(f"it answers with more than {MOST_ANSWER_BYTES >> 20} MB")

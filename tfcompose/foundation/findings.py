@@ -1,7 +1,7 @@
-"""Findings about a robot: a code, a message, a place and a way out.
+"""Findings about a robot: a code, a message, a place and advice.
 
-One space of codes serves lint, guard and the live tools, so that a second publisher that was
-predicted and one that was seen read alike. A code is never used again for something else.
+``lint``, the guard and the live tools share the codes. So a predicted second publisher and an
+observed one are reported in the same way. A code is never reused for another meaning.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Span(NamedTuple):
-    """A stretch of a file. Lines and columns count from 1; the end is exclusive."""
+    """A range in a file. Lines and columns count from 1; the end is exclusive."""
 
     file: str
     line: int = 1
@@ -30,14 +30,14 @@ class Span(NamedTuple):
         return f"{self.file}:{self.line}:{self.column}"
 
     def holds(self, other: Span) -> bool:
-        """Return whether the other stretch begins in this one."""
+        """Return whether another range begins inside this range."""
         begin, end = (self.line, self.column), (self.end_line, self.end_column)
         return self.file == other.file and begin <= (other.line, other.column) < end
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A further place, or fact, that belongs to a finding."""
+    """A further place or fact for a finding."""
 
     message: str
     span: Span | None = None
@@ -45,57 +45,57 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """A stretch of a file and its replacement. An empty stretch inserts."""
+    """A range in a file and its replacement. An empty range means an insertion."""
 
     span: Span
-    #: A scalar's value, which keeps its quotes, or YAML to write as it is.
+    #: The value of a scalar, whose quotes are kept, or YAML to insert unchanged.
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A fault in a file or a running tree, complete where it is made."""
+    """A fault in a file or a running tree, complete when it is created."""
 
     code: str
     name: str
     severity: Severity
-    #: One line with the names and values involved, without advice.
+    #: A line with the names and values involved, without advice.
     message: str
-    #: None for an observation of a live tree.
+    #: The place, None for an observation of a live tree.
     span: Span | None = None
     #: Other places of a conflict, and further facts.
     notes: tuple[Note, ...] = ()
     #: The advice.
     help: str = ""
-    #: Together the one safe fix, where there is one.
+    #: Edits that together are the only safe fix, if there is one.
     edits: tuple[Edit, ...] = ()
 
     @property
     def label(self) -> str:
-        """Code and name: "TF808 process_failed"."""
+        """Code and name, such as "TF808 process_failed"."""
         return f"{self.code} {self.name}"
 
     @property
     def sort_key(self) -> tuple[str, int, int, str, str]:
-        """By place, then by code: the order in which findings are shown."""
+        """The key for the order of display: by place, then by code."""
         span = self.span or Span("")
         return (span.file, span.line, span.column, self.code, self.message)
 
 
 @dataclass(frozen=True, slots=True)
 class Allow:
-    """A comment that allows findings with these codes, and why."""
+    """A comment that allows findings with these codes, with a reason."""
 
     codes: tuple[str, ...]
     line: int
     reason: str
     span: Span
-    #: The last line that it covers; 0: ``line`` alone.
+    #: The last line to which it applies; 0 for ``line`` only.
     last: int = 0
 
 
 class RejectedError(Exception):
-    """Raised by a stage that cannot go on; it holds everything that the stage found, in order."""
+    """A stage cannot continue. The error holds all findings of the stage, in order."""
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(sorted(findings, key=lambda finding: finding.sort_key))
@@ -112,12 +112,12 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     severity: Severity | None = None,
     edits: Iterable[Edit] = (),
 ) -> Finding:
-    """Return the finding with its code's name, and its default severity if none is given."""
-    known = CATALOGUE[code]
+    """Return a finding with the name of its code, and by default the code's severity."""
+    entry = CATALOGUE[code]
     return Finding(
         code,
-        known.name,
-        severity or known.severity,
+        entry.name,
+        severity or entry.severity,
         message=message,
         span=span,
         notes=tuple(notes),
@@ -127,9 +127,9 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
 
 
 def without_duplicates(findings: Iterable[Finding]) -> list[Finding]:
-    """Return each finding once, in order.
+    """Return the findings without duplicates, in order.
 
-    Of those that differ in notes only, the first, with the notes of all.
+    Findings that differ only in notes are merged, with the notes of all of them.
     """
     first: dict[Finding, Finding] = {}
     for finding in findings:
@@ -141,16 +141,16 @@ def without_duplicates(findings: Iterable[Finding]) -> list[Finding]:
     return list(first.values())
 
 
-_BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # as YAML counts lines
+_BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # line breaks of YAML
 
 
 def line_starts(text: str) -> list[int]:
-    """Return where each line of a YAML text begins."""
+    """Return the index at which each line of a YAML text begins."""
     return [0, *(match.end() for match in _BREAK.finditer(text))]
 
 
 def apply_edits(text: str, edits: Sequence[Edit]) -> str | None:
-    """Return the text with the edits in it, or None where two of them meet or one lies outside."""
+    """Return the edited text, None if two edits overlap or an edit is outside the text."""
     starts = line_starts(text)
     newline = "\r\n" if "\r\n" in text else "\n"
     pieces: list[tuple[int, int, str]] = []
@@ -158,7 +158,7 @@ def apply_edits(text: str, edits: Sequence[Edit]) -> str | None:
         span, new = edit.span, edit.text.replace("\n", newline)
         if (
             span.line == len(starts) + 1 and span.column == 1
-        ):  # behind a last line that does not end
+        ):  # after a last line without a line break
             pieces.append((len(text), len(text), newline + new.removesuffix(newline)))
             continue
         if span.end_line > len(starts):
@@ -177,58 +177,59 @@ def apply_edits(text: str, edits: Sequence[Edit]) -> str | None:
     return text
 
 
-def nearest(text: str, known: Iterable[str], cutoff: float = 0.61) -> str | None:
-    """Return the known word that a person most likely meant by ``word``, or None.
+def nearest(text: str, names: Iterable[str], cutoff: float = 0.61) -> str | None:
+    """Return the most similar name, None if no name is similar enough.
 
-    1 is as near as the word itself.
+    ``cutoff`` is the minimum similarity; 1 means equal.
     """
     import difflib
 
-    found = difflib.get_close_matches(
-        text.lower(), {name.lower(): name for name in known}, n=1, cutoff=cutoff
+    matches = difflib.get_close_matches(
+        text.lower(), {name.lower(): name for name in names}, n=1, cutoff=cutoff
     )
-    return next((name for name in known if name.lower() == found[0]), None) if found else None
+    return next((name for name in names if name.lower() == matches[0]), None) if matches else None
 
 
-def slip_of(name: str, known: Iterable[str]) -> str | None:
-    """Return the only known word that ``word`` is a slip of the pen away from, or None."""
-    near = slips_of(name, known)
+def slip_of(name: str, names: Iterable[str]) -> str | None:
+    """Return the only name that differs by a single typing error, or None."""
+    near = slips_of(name, names)
     return near[0] if len(near) == 1 else None
 
 
-#: Of more words than this that are as near, one is proposed.
+#: If more names than this are equally near, only one is proposed.
 _MOST_NEAR = 3
 
 
-def slips_of(text: str, known: Iterable[str]) -> list[str]:
-    """Return the known words that ``text`` is a slip of the pen away from.
+def slips_of(text: str, names: Iterable[str]) -> list[str]:
+    """Return the names that differ by a single typing error.
 
-    That is: another case; or else one letter too many, too few, wrong, or changed for its
+    This is a different case, or else a letter that is added, missing, wrong, or swapped with its
     neighbour.
     """
-    others = [name for name in known if name != text]
-    cased = [name for name in others if name.lower() == text.lower()]
-    return cased or [name for name in others if len(text) > 1 and _is_one_slip(text, name)]
+    candidates = [name for name in names if name != text]
+    cased = [name for name in candidates if name.lower() == text.lower()]
+    return cased or [name for name in candidates if len(text) > 1 and _is_one_slip(text, name)]
 
 
 def _is_one_slip(a: str, b: str) -> bool:
     if abs(len(a) - len(b)) > 1:
         return False
     same = next(
-        (at for at, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b))
+        (index for index, (x, y) in enumerate(zip(a, b, strict=False)) if x != y),
+        min(len(a), len(b)),
     )
     a, b = a[same:], b[same:]
     swapped = a[1::-1] == b[:2] and a[2:] == b[2:] and len(a) > 1
     return a[1:] == b[1:] or a[1:] == b or a == b[1:] or swapped
 
 
-def did_you_mean(name: str, known: Iterable[str], otherwise: str = "") -> str:
-    """Return advice that names the nearest words, or ``otherwise`` if none is near."""
-    names = list(dict.fromkeys(known))
+def did_you_mean(name: str, candidates: Iterable[str], otherwise: str = "") -> str:
+    """Return advice with the nearest names, or ``otherwise`` if no name is near."""
+    names = list(dict.fromkeys(candidates))
     near = slips_of(name, names)
     if not 1 < len(near) <= _MOST_NEAR:
         near = [match for match in (nearest(name, names),) if match]
     if not near:
         return otherwise
-    *others, last = near
-    return f"did you mean {' or '.join(filter(None, (', '.join(others), last)))}?"
+    *leading, last = near
+    return f"did you mean {' or '.join(filter(None, (', '.join(leading), last)))}?"

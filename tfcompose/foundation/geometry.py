@@ -1,8 +1,8 @@
-"""Poses: where a child frame is, in its parent.
+"""Poses of child frames in their parents.
 
-A ``Pose`` is the pose of B in A: it takes coordinates in B to coordinates in A. Rotations are unit
-quaternions in the order x, y, z, w. Axes follow REP-103 (x forward, y left, z up); roll, pitch and
-yaw are rotations about the *fixed* axes x, y, z in that order, as in URDF and tf2's ``setRPY``.
+A ``Pose`` is the pose of B in A. It maps coordinates in B to coordinates in A. Rotations are unit
+quaternions in the order x, y, z, w. Axes follow REP-103 (x forward, y left, z up). Roll, pitch and
+yaw are rotations about the *fixed* axes x, y, z in this order, as in URDF and tf2's ``setRPY``.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Pose(NamedTuple):
     quat_xyzw: Quaternion = IDENTITY_XYZW
 
     def __matmul__(self, c_in_b: Pose) -> Pose:
-        """Return the pose of C in A, from this pose of B in A and that of C in B."""
+        """Return the pose of C in A: this pose of B in A, times the pose of C in B."""
         x, y, z = rotate(self.quat_xyzw, c_in_b.xyz)
         xyz = (self.xyz[0] + x, self.xyz[1] + y, self.xyz[2] + z)
         return Pose(xyz, multiply(self.quat_xyzw, c_in_b.quat_xyzw))
@@ -44,7 +44,7 @@ class Pose(NamedTuple):
 
     @property
     def rpy(self) -> Vector:
-        """Roll, pitch and yaw in radians about the fixed axes; at pitch ±π/2 the roll is 0."""
+        """Roll, pitch and yaw in radians about the fixed axes. At pitch ±π/2 the roll is 0."""
         return rpy_from_quat(self.quat_xyzw)
 
 
@@ -63,7 +63,7 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def rotate(quat_xyzw: Quaternion, xyz: Vector) -> Vector:
-    """Return ``xyz`` turned by the rotation: v + 2w(q × v) + 2q × (q × v)."""
+    """Return ``xyz`` rotated by the quaternion: v + 2w(q × v) + 2q × (q × v)."""
     x, y, z, w = quat_xyzw
     vx, vy, vz = xyz
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
@@ -80,12 +80,12 @@ def norm(values: tuple[float, ...]) -> float:
 
 
 def normalise(quat_xyzw: Quaternion) -> Quaternion:
-    """Return the quaternion at unit length.
+    """Return the quaternion scaled to unit length.
 
-    One that is there already to the last bit is returned as it is.
+    A quaternion of exactly unit length is returned unchanged.
 
     Raises:
-        ZeroDivisionError: if all four parts are 0.
+        ZeroDivisionError: if all four components are 0.
     """
     length = norm(quat_xyzw)
     if length == 1.0:
@@ -95,7 +95,7 @@ def normalise(quat_xyzw: Quaternion) -> Quaternion:
 
 
 def quat_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Return Rz(yaw)·Ry(pitch)·Rx(roll), radians: URDF's and setRPY's convention."""
+    """Return Rz(yaw)·Ry(pitch)·Rx(roll), in radians: the convention of URDF and setRPY."""
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
     cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -112,10 +112,9 @@ def quat_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 def rpy_from_quat(quat_xyzw: Quaternion) -> Vector:
     """Return roll, pitch, yaw in radians about fixed axes.
 
-    At pitch ±π/2 only yaw ∓ roll is defined, and roll is 0.
-
-    Near there the yaw is known to few digits only; the roll is what then remains to be turned, so
-    that the three together are the rotation to the last digits.
+    At pitch ±π/2 only yaw ∓ roll is defined, and roll is 0. Near ±π/2, yaw has few significant
+    digits. Roll is computed from the remaining rotation, so that the three angles together give
+    the exact rotation.
     """
     (r00, r01, _), (r10, r11, _), (r20, _, _) = matrix_from_quat(quat_xyzw)
     horizontal = math.hypot(r00, r10)
@@ -129,10 +128,10 @@ def rpy_from_quat(quat_xyzw: Quaternion) -> Vector:
 
 
 def quat_from_axis_angle(axis: Vector, angle: float) -> Quaternion:
-    """Return the rotation by ``angle`` radians about ``axis`` (any length but 0), right-handed.
+    """Return the right-handed rotation by ``angle`` radians about ``axis`` of any length but 0.
 
     Raises:
-        ZeroDivisionError: if the axis has no length.
+        ZeroDivisionError: if the axis has length 0.
     """
     length = norm(axis)
     s = math.sin(angle / 2) / length
@@ -152,8 +151,8 @@ def matrix_from_quat(quat_xyzw: Quaternion) -> Matrix:
 def quat_from_matrix(rows: Matrix) -> Quaternion:
     """Return the quaternion of a rotation matrix given as rows.
 
-    Of the four ways to read it the one with the largest divisor is taken (Shepperd, 1978), so that
-    it is exact for half turns too.
+    Of the four formulas, the function uses the one with the largest divisor (Shepperd, 1978), so
+    that half turns are exact, too.
     """
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = rows
     four = (1 + r00 - r11 - r22, 1 - r00 + r11 - r22, 1 - r00 - r11 + r22, 1 + r00 + r11 + r22)
@@ -174,8 +173,8 @@ def angle_between(a: Quaternion, b: Quaternion) -> float:
     return 2 * math.atan2(norm((x, y, z)), abs(w))
 
 
-#: What is no distance and no angle for people, in metres and radians, and what computing adds to
-#: either.
+#: Distances in metres and angles in radians below these values are displayed as nothing; and the
+#: size of rounding errors.
 _NO_MM, _NO_RAD, _ROUNDING = 1e-6, 1e-6, 1e-9
 
 
@@ -187,18 +186,18 @@ class Offset(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Both in millimetres and degrees, without what is nothing."""
+        """Distance in millimetres and angle in degrees as text, without negligible values."""
         distance = f"{self.xyz_m * 1e3:.3g} mm" if self.xyz_m < 1 else f"{self.xyz_m:.3g} m"
         parts = [distance] if self.xyz_m >= _NO_MM else []
         parts += [f"{math.degrees(self.rot_rad):.3g} deg"] if self.rot_rad >= _NO_RAD else []
         return " and ".join(parts) or "nothing"
 
     def beyond(self, limit: Offset) -> bool:
-        """Whether the distance or angle exceeds ``limit`` by more than rounding."""
+        """Return whether the distance or the angle exceeds ``limit`` by more than rounding."""
         return self.xyz_m > limit.xyz_m + _ROUNDING or self.rot_rad > limit.rot_rad + _ROUNDING
 
 
 def offset_of(expected: Pose, observed: Pose) -> Offset:
-    """Return how far ``observed`` is from ``expected``; quaternions need not be of length 1."""
+    """Return the distance and angle between two poses. Quaternions need not have length 1."""
     angle = angle_between(normalise(expected.quat_xyzw), normalise(observed.quat_xyzw))
     return Offset(math.dist(expected.xyz, observed.xyz), angle)

@@ -1,4 +1,4 @@
-"""Calls of what tools bring: a tool that crashes is a finding, and the others go on."""
+"""Calls of functions of tools. A crash of a tool becomes a finding, and other tools still run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tfcompose.foundation.tool import load
 def run_hook(
     reference: str, owner: str, span: Span | None, *arguments: Any
 ) -> list[Any] | Finding:
-    """Return what a tool's function yields; the finding TF903 where it crashes."""
+    """Return what a tool's function yields, or the finding TF903 if it crashes."""
     try:
         return list(load(reference)(*arguments))
     except Exception as error:  # noqa: BLE001 (a tool's fault must not hide the others' findings)

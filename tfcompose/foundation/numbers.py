@@ -1,6 +1,6 @@
-"""The one writer of numbers.
+"""The only writer of numbers: the shortest text that reads back as the same number.
 
-The shortest text that reads back the same, no −0, no noise from computing.
+There is no −0, and rounding noise is removed.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ ANGLE_NOISE_RAD = 1e-12
 NEAR_UPRIGHT_RAD = 1e-6
 
 
-#: Numbers and rotations repeat, in one file and from file to file.
+#: Cache size. The same numbers and rotations occur many times.
 _REMEMBERED = 1 << 16
 
 
 @lru_cache(maxsize=_REMEMBERED)
 def number(value: float) -> str:
-    """Return the number as text: ``0.3``, ``1``, ``1e-05``."""
+    """Return the number as text, such as ``0.3``, ``1`` or ``1e-05``."""
     value = value + 0.0  # −0 becomes 0
     return str(int(value)) if value.is_integer() and abs(value) < 2**53 else repr(value)
 
 
 def numbers(values: tuple[float, ...]) -> str:
-    """Return the numbers with spaces between them, as URDF wants them."""
+    """Return the numbers as text separated by spaces, as in URDF."""
     return " ".join(map(number, values))
 
 
 @lru_cache(maxsize=_REMEMBERED)
 def clean_xyz(xyz: Vector) -> Vector:
-    """Return the lengths rounded to a picometre, which removes rounding residue."""
+    """Return the lengths in metres rounded to a picometre, which removes rounding noise."""
     x, y, z = xyz
     return (
         round(x, METRE_DECIMALS) + 0.0,
@@ -56,10 +56,10 @@ def clean_xyz(xyz: Vector) -> Vector:
 
 @lru_cache(maxsize=_REMEMBERED)
 def clean_quat(quat_xyzw: Quaternion) -> Quaternion:
-    """Return the quaternion rounded to 14 decimals, so that one rotation has one text.
+    """Return the quaternion rounded to 14 decimals, so that equal rotations have equal texts.
 
-    Of a quaternion and its negative the one is taken whose w is positive; where w is 0, whose
-    first other part is.
+    A quaternion and its negative are the same rotation. The result is the one with positive w, or,
+    if w is 0, with a positive first nonzero component.
     """
     x, y, z, w = (round(value, QUATERNION_DECIMALS) + 0.0 for value in quat_xyzw)
     if next((value for value in (w, x, y, z) if value), 1.0) < 0:
@@ -68,22 +68,20 @@ def clean_quat(quat_xyzw: Quaternion) -> Quaternion:
 
 
 def clean(pose: Pose) -> Pose:
-    """Return the pose as every file has it."""
+    """Return the pose as written to files."""
     return Pose(clean_xyz(pose.xyz), clean_quat(pose.quat_xyzw))
 
 
 def clean_rpy(quat_xyzw: Quaternion) -> Vector:
     """Return roll, pitch, yaw in radians.
 
-    A whole degree within the noise of computing is exactly that.
-
-    Near pitch ±π/2 the yaw is known to few digits only, and the roll is what then remains to be
-    turned.
+    Angles within rounding noise of a whole degree become exactly that degree. Near pitch ±π/2, yaw
+    has few significant digits, and roll is computed from the remaining rotation.
     """
     x, y, z, w = quat_xyzw
     return _clean_rpy(
         (x + 0.0, y + 0.0, z + 0.0, w + 0.0)
-    )  # −0 becomes 0: what is remembered cannot tell them apart
+    )  # −0 becomes 0, because the cache cannot distinguish them
 
 
 @lru_cache(maxsize=_REMEMBERED)
@@ -92,12 +90,12 @@ def _clean_rpy(quat_xyzw: Quaternion) -> Vector:
     first = _with_roll(pitch, yaw, quat_xyzw)
     if abs(abs(pitch) - math.pi / 2) > NEAR_UPRIGHT_RAD:
         return first
-    # So near to ±π/2 it may be on either side of it, and where that is not all, roll and yaw are
-    # far from round.
+    # This close to ±π/2, the pitch may be on either side of it. Otherwise, roll and yaw would be
+    # far from round numbers.
     (r00, _, _), (r10, _, _), (r20, _, _) = matrix_from_quat(quat_xyzw)
-    other = _with_roll(math.copysign(math.pi, pitch) - pitch, yaw, quat_xyzw)
+    flipped = _with_roll(math.copysign(math.pi, pitch) - pitch, yaw, quat_xyzw)
     exact = _with_roll(math.atan2(-r20, math.hypot(r00, r10)), math.atan2(r10, r00), quat_xyzw)
-    off = {rpy: angle_between(quat_from_rpy(*rpy), quat_xyzw) for rpy in (first, other, exact)}
+    off = {rpy: angle_between(quat_from_rpy(*rpy), quat_xyzw) for rpy in (first, flipped, exact)}
     return next(
         (rpy for rpy, angle in off.items() if angle < ANGLE_NOISE_RAD),
         min(off, key=off.__getitem__),
@@ -105,7 +103,7 @@ def _clean_rpy(quat_xyzw: Quaternion) -> Vector:
 
 
 def _with_roll(pitch: float, yaw: float, quat_xyzw: Quaternion) -> Vector:
-    """Return the angles with the roll that remains to be turned."""
+    """Return the angles, with roll computed from the remaining rotation."""
     x, y, z, w = quat_from_rpy(0.0, pitch, yaw)
     rotation = multiply((-x, -y, -z, w), quat_xyzw)
     roll = 2 * (
@@ -122,5 +120,5 @@ def _integer_degree(angle: float) -> float:
 
 
 def clean_tensor(tensor: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the moments to 12 significant digits, which no measurement reaches."""
+    """Return the moments with 12 significant digits, more than any measurement has."""
     return tuple([float(f"{value:.12g}") for value in tensor])

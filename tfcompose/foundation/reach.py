@@ -1,8 +1,9 @@
 """The files that a robot file, a xacro file or a launch file may read: its tree, and packages.
 
-The tree of a file is its folder, the Git repository and the package around that. Where its folder
-is shared by unrelated files, as the home and /tmp are, the tree is the descriptions beside it.
-Functions of posixpath return False where those of pathlib raise, as for names that are too long.
+The tree of a file is its folder, and the Git repository and the package around the folder. Some
+folders contain unrelated files, such as the home directory and /tmp. In these, the tree consists
+only of descriptions in the same folder. This module uses functions of posixpath, which return
+False where functions of pathlib raise, for example for a name that is too long.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import Final, NamedTuple
 
-#: Folders of the system, and those that programs put unrelated files into.
+#: Folders of the system, and folders into which programs put unrelated files.
 _SHARED: Final = frozenset(
     {
         "/",
@@ -37,7 +38,7 @@ _SHARED: Final = frozenset(
         "/var/tmp",  # noqa: S108 (the same)
     }
 )
-#: What libraries of the system read: themselves, the time zone, and what is no file.
+#: Paths that system libraries read: the libraries, the time zone, and devices.
 _SYSTEM: Final = (
     "/usr/lib",
     "/usr/lib64",
@@ -52,33 +53,33 @@ _SYSTEM: Final = (
 )
 _OF_KERNEL: Final = re.compile(r"/(dev|proc|run|sys)(/|$)")
 _HOME: Final = re.compile(r"/home/[^/]+")
-#: Files that lie beside a robot file, and are about it.
+#: Endings of descriptions in a robot file's folder that belong to the robot file.
 _DESCRIPTIONS: Final = (".launch", ".py", ".srdf", ".urdf", ".xacro", ".xml", ".yaml", ".yml")
 _PACKAGE_NAME: Final = re.compile(rb"<name>\s*[^<\s]+\s*</name>")
 _MOST_OF_MANIFEST: Final = 1_000_000
 _MANIFEST: Final = "package.xml"
-#: Folders of a package whose files name those in the others, as ../urdf/arm.xacro.
+#: Folders of a package whose files refer to each other, such as ../urdf/arm.xacro.
 _LAYOUT: Final = frozenset({"config", "launch", "robots", "urdf", "xacro"})
-#: Git keeps credentials there: actions/checkout writes a token into .git/config.
+#: Folder with Git's credentials. For example, actions/checkout writes a token to .git/config.
 _HIDDEN: Final = ".git"
 _HIGHEST: Final = 12
-#: How deep below a folder repositories are looked for.
+#: Depth below a folder to which repositories are searched.
 _DEPTH: Final = 2
 
 
 class OutsideError(Exception):
-    """A path is outside of what may be read."""
+    """A path is outside the permitted paths."""
 
 
 class Grants(NamedTuple):
-    """Paths that may be read, folders with all that is below; and folders that may be listed."""
+    """Paths that may be read, with everything below them, and folders that may be listed."""
 
     paths: list[str]
     listed: list[str]
 
 
 class Reach:
-    """The paths that may be read; all of them if ``everything`` is true."""
+    """The paths that may be read, or all paths if ``everything`` is true."""
 
     def __init__(self, *, everything: bool = False) -> None:
         self.everything = everything
@@ -86,7 +87,7 @@ class Reach:
         self._libraries: dict[str, None] = {}
 
     def add_tree(self, file: str) -> None:
-        """Add the tree of a file."""
+        """Permit the tree of a file."""
         folder = posixpath.realpath(posixpath.dirname(posixpath.abspath(file)))
         if is_shared(folder):
             self._roots.update(dict.fromkeys(_descriptions_in(folder)))
@@ -100,7 +101,10 @@ class Reach:
                 self.add_folder(above)
 
     def add_folder(self, folder: str) -> None:
-        """Add a folder; where it is a package whose files are links, also the package's source."""
+        """Permit a folder.
+
+        If its files are links to a package's source, permit the source, too.
+        """
         folder = posixpath.realpath(folder)
         source = posixpath.dirname(posixpath.realpath(posixpath.join(folder, _MANIFEST)))
         for path in (folder, source):
@@ -108,13 +112,13 @@ class Reach:
                 self._roots[path] = None
 
     def add_package_around(self, file: str) -> None:
-        """Add the package that a file is in, if it is in one."""
+        """Permit the package that contains the file, if there is one."""
         folder = _above(posixpath.realpath(posixpath.dirname(file)), _MANIFEST)
         if folder and is_package(folder):
             self.add_folder(folder)
 
     def add_prefix(self, prefix: str) -> None:
-        """Add the packages that are installed below a prefix of AMENT_PREFIX_PATH."""
+        """Permit the packages installed below a prefix from AMENT_PREFIX_PATH."""
         share = posixpath.join(prefix, "share")
         self.add_folder(share)
         for folder in _folders_in(share):
@@ -122,25 +126,25 @@ class Reach:
                 self.add_folder(folder)
 
     def add_neighbours(self, file: str) -> None:
-        """Add the packages that lie beside a file, or beside a folder that it is in."""
+        """Permit the packages next to the file, or next to a folder that contains it."""
         for above in list(Path(file).absolute().parents)[:_HIGHEST]:
             for folder in (str(above), *_folders_in(str(above))):
                 if is_package(folder):
                     self.add_folder(folder)
 
     def add_libraries(self) -> None:
-        """Add what Python loads modules from, and the system its libraries."""
+        """Permit the paths of Python's modules and of the system's libraries."""
         loaded = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
         around = posixpath.realpath("")
         paths = [sys.prefix, sys.base_prefix, *sys.path, *filter(None, loaded)]
         for path in map(posixpath.realpath, filter(None, paths)):
-            if not is_shared(path) and path != around:  # python -m puts the working folder there
+            if not is_shared(path) and path != around:  # python -m adds the working directory
                 self._libraries[path] = None
         self._libraries.update(dict.fromkeys(map(posixpath.realpath, _SYSTEM)))
         self._libraries[posixpath.dirname(posixpath.dirname(posixpath.realpath(__file__)))] = None
 
     def allows(self, path: str) -> bool:
-        """Return whether a path may be read, wherever links lead."""
+        """Return whether a path may be read, after following links."""
         if "\0" in path:
             return False
         real = posixpath.realpath(path)
@@ -151,29 +155,29 @@ class Reach:
         return any(real == root or real.startswith(f"{root}/") for root in self._roots)
 
     def read(self, path: str, most: int) -> bytes:
-        """Return the bytes of a plain file.
+        """Return the content of a regular file.
 
         Raises:
             OutsideError: if it may not be read.
-            OSError: if it cannot be read, or has more than so many bytes.
+            OSError: if it cannot be read or has more than ``most`` bytes.
         """
         if not self.allows(path):
             raise OutsideError(path)
         return _read_plain(posixpath.realpath(path), path, most)
 
     def names_in(self, folder: str) -> list[str]:
-        """Return the names in a folder, in order.
+        """Return the names in a folder, sorted.
 
         Raises:
             OutsideError: if it may not be listed.
-            OSError: if it cannot be.
+            OSError: if it cannot be listed.
         """
         if not self.allows(folder):
             raise OutsideError(folder)
         return sorted(os.listdir(folder))  # noqa: PTH208 (names)
 
     def grants(self) -> Grants:
-        """Return all of it for the kernel, which cannot leave out what is below a folder."""
+        """Return the permitted paths for the kernel, which cannot exclude paths below a folder."""
         grants = Grants([], [])
         for root in self._roots:
             _grant(root, _DEPTH, grants)
@@ -182,12 +186,12 @@ class Reach:
 
 
 def _read_plain(real: str, path: str, most: int) -> bytes:
-    """Return the bytes of a file that findings call ``path``.
+    """Return the content of a regular file; findings call it ``path``.
 
     Raises:
-        OSError: if it cannot be read, is no plain file, or has more than so many bytes.
+        OSError: if it cannot be read, is not a regular file, or has more than ``most`` bytes.
     """
-    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK  # a pipe would be waited for
+    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK  # opening a pipe would block
     file = os.open(real, flags)
     try:
         if not stat.S_ISREG(os.fstat(file).st_mode):
@@ -202,7 +206,7 @@ def _read_plain(real: str, path: str, most: int) -> bytes:
 
 
 def _grant(root: str, depth: int, grants: Grants) -> None:
-    """Add a path; a folder with a repository by what is in it, without the repository."""
+    """Permit a path. For a folder with a repository, permit its entries except the repository."""
     if not _has_repository(root, depth):
         grants.paths.append(root)
         return
@@ -225,7 +229,7 @@ def _has_repository(folder: str, depth: int) -> bool:
 
 
 def is_shared(folder: str) -> bool:
-    """Return whether unrelated files lie in a folder, such as the home, one above it, or /tmp."""
+    """Return whether a folder contains unrelated files, such as the home directory or /tmp."""
     return (
         folder in _SHARED
         or f"{_home()}/".startswith(f"{folder}/")
@@ -243,13 +247,13 @@ def is_package(folder: str) -> bool:
     manifest = posixpath.join(folder, _MANIFEST)
     try:
         data = _read_plain(manifest, manifest, _MOST_OF_MANIFEST)
-    except (OSError, ValueError):  # not there, or no path
+    except (OSError, ValueError):  # missing, or an invalid path
         return False
     return _PACKAGE_NAME.search(data) is not None
 
 
 def _above(folder: str, name: str) -> str:
-    """Return the nearest folder, from this one upwards, that has an entry of a name, or ''."""
+    """Return the nearest folder, from this folder upwards, with an entry ``name``, or ""."""
     for _ in range(_HIGHEST):
         if is_shared(folder):
             break
@@ -263,7 +267,7 @@ def _entries(folder: str) -> list[os.DirEntry[str]]:
     try:
         with os.scandir(folder) as entries:
             return list(entries)
-    except OSError:  # a file, or one that may not be entered
+    except OSError:  # a file, or a folder without permission
         return []
 
 

@@ -1,8 +1,8 @@
-"""Reading of files: whatever the disk answers is a value or a finding, for every command alike.
+"""Reading of files: every answer of the disk becomes a value or a finding.
 
-``Path.is_file`` and its like raise for a folder that may not be entered, for a name that is too
-long, and for links in a circle, and opening a pipe waits for its other end. Here a path that
-cannot be looked at is no file, and one that cannot be read is one finding that names it.
+``Path.is_file`` and similar methods raise for a folder without permission, a name that is too
+long, and a loop of links. Opening a pipe waits for its other end. Here, a path that cannot be
+examined counts as missing. A path that cannot be read becomes a finding that names the path.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from pathlib import Path
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.procfs import PROC
 
-#: Of a file of text: robot, description, plan.
+#: Maximum number of bytes of a text file: robot, description, plan.
 MOST_BYTES = 16_000_000
-#: So many files are named where one is not there.
+#: Maximum number of existing files that a finding about a missing file lists.
 _MOST_NAMED = 8
-#: Pipes that the shell has opened. One with a name would block until it is written to.
+#: Pipes that the shell has opened. A named pipe would block until a program writes to it.
 _OPEN_ALREADY = ("/dev/fd/", "/dev/stdin")
-#: Of files with another ending than these, the robot files are named that are there in their
-#: place.
+#: If a missing file has one of these endings, files with the same ending are listed, otherwise
+#: robot files.
 _ENDINGS = (".urdf", ".xacro", ".launch", ".py", ".xml", ".sh", ".bash")
 
 
 def is_file(path: str | Path) -> bool:
-    """Return whether a file is there that can be looked at; a link counts as what it leads to."""
+    """Return whether a regular file exists and can be examined, after following links."""
     return os.path.isfile(path)  # noqa: PTH113 (that of pathlib raises)
 
 
 def is_folder(path: str | Path) -> bool:
-    """Return whether a folder is there that can be looked at."""
+    """Return whether a folder exists and can be examined."""
     return os.path.isdir(path)  # noqa: PTH112 (as above)
 
 
 def exists(path: str | Path) -> bool:
-    """Return whether anything is there that can be looked at."""
+    """Return whether the path exists and can be examined."""
     return os.path.exists(path)  # noqa: PTH110 (as above)
 
 
@@ -45,7 +45,7 @@ def names_in(folder: str | Path) -> list[str]:
     """Return the names in a folder, sorted.
 
     Raises:
-        RejectedError: with one TF001 finding, if it cannot be listed.
+        RejectedError: with a TF001 finding, if it cannot be listed.
     """
     try:
         return sorted(os.listdir(folder))  # noqa: PTH208 (names)
@@ -54,11 +54,11 @@ def names_in(folder: str | Path) -> list[str]:
 
 
 def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
-    """Return what a file holds.
+    """Return the content of a file.
 
     Raises:
-        RejectedError: with one TF001 or TF008 finding, if it cannot be read, is a pipe that nobody
-        has opened, or holds more than so many bytes.
+        RejectedError: with a TF001 or TF008 finding, if it cannot be read, is a pipe that the
+            shell has not opened, or has more than ``most`` bytes.
     """
     name = str(path)
     try:
@@ -80,7 +80,7 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
 
 
 def _bytes_of(descriptor: int, name: str, most: int) -> bytes | None:
-    """Return at most so many bytes of an open file; None where there is nothing to read yet."""
+    """Return at most ``most`` bytes of an open file, None if no data are available yet."""
     kind = os.fstat(descriptor).st_mode
     if stat.S_ISDIR(kind):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), name)
@@ -92,7 +92,7 @@ def _bytes_of(descriptor: int, name: str, most: int) -> bytes | None:
 
 
 def no_text(path: str, data: bytes, error: UnicodeDecodeError, advice: str) -> RejectedError:
-    """Return the error that a file is not UTF-8, at the place of the first byte that is not."""
+    """Return the error that a file is not UTF-8, at the place of the first invalid byte."""
     before = data[: error.start]
     line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
     message = f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8"
@@ -101,7 +101,7 @@ def no_text(path: str, data: bytes, error: UnicodeDecodeError, advice: str) -> R
 
 
 def unreadable(path: str | Path, error: OSError | ValueError) -> RejectedError:
-    """Return the error that a file or folder cannot be read, with what is there in its place."""
+    """Return the error that a file or folder cannot be read, with existing alternatives."""
     name = str(path)
     if not isinstance(error, OSError):
         return RejectedError([finding("TF001", "a file name cannot hold a NUL byte", Span("?"))])
@@ -118,9 +118,9 @@ def _files_next_to(name: str) -> str:
     folder = Path(name).parent
     ending = next((ending for ending in _ENDINGS if name.endswith(ending)), ".yaml")
     try:
-        there = [other for other in names_in(folder) if other.endswith(ending)]
+        files = [file for file in names_in(folder) if file.endswith(ending)]
     except RejectedError:
-        there = []
-    if not there:
+        files = []
+    if not files:
         return f"there is no {ending} file in {folder}"
-    return f"the folder {folder} contains {', '.join(there[:_MOST_NAMED])}"
+    return f"the folder {folder} contains {', '.join(files[:_MOST_NAMED])}"

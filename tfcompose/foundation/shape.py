@@ -1,4 +1,4 @@
-"""The shape of data that came as JSON from a process that may have been taken over."""
+"""The structure of JSON data from a process that may have been compromised."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 def fits(value: Any, shape: Any) -> bool:
     """Return whether a value has a shape.
 
-    A shape is a type, a list with the shape of all its items, a tuple of shapes of which one has
-    to fit, a mapping of keys to shapes, None or Any. A key that ends with ``?`` may be missing,
-    the key ``*`` is every key. A bool is no int.
+    A shape is a type, a list with the shape of all its items, a tuple of alternative shapes, a
+    mapping from keys to shapes, None or Any. A key that ends with ``?`` is optional. The key ``*``
+    stands for every key. A bool does not count as an int.
     """
     if shape is Any:
         return True

@@ -1,12 +1,14 @@
-"""Signals for tfcompose's commands and processes: none is lost, and each ends any wait.
+"""Signals for tfcompose's commands and processes. No signal is lost, and each ends any wait.
 
-While a command loads, Ctrl-C ends it also where Python can raise nothing: Python throws an
-exception away that comes up in a callback of its own, such as those that its import system has,
-and goes on. So what SIGINT raises there is remembered, for whoever handles signals next.
-pydantic's Rust prints a panic where an exception comes to it while it loads; SIGINT raises nothing
-before pydantic has returned. A process then has a flag that SIGINT, SIGTERM and SIGHUP set, and
-that wakes whoever waits. ROS is not imported: a process handles signals before it spends a second
-on starting it.
+While a command loads its modules, Ctrl-C must end it even where Python ignores exceptions. Python
+ignores an exception in its own callbacks, for example in the import system, and continues. So
+SIGINT also stores the interrupt, and the code that next handles signals raises it. pydantic's Rust
+code prints a panic if an exception reaches it while it loads. So SIGINT raises nothing until
+pydantic has returned.
+
+Later, a process has a flag that SIGINT, SIGTERM and SIGHUP set and that ends every wait. This
+module does not import ROS, because a process handles signals before it spends a second on starting
+ROS.
 """
 
 from __future__ import annotations
@@ -25,23 +27,22 @@ if TYPE_CHECKING:
 
 
 _remembered: list[int] = []
-#: So long an interrupt is held before pydantic is looked for again.
+#: Interval at which a delayed interrupt is tried again while pydantic loads, in seconds.
 HELD_S = 0.02
 
 
 def take_interrupt() -> bool:
-    """Return whether there was a Ctrl-C that nobody took yet, and take it."""
+    """Return whether a Ctrl-C is pending, and clear it."""
     came = bool(_remembered)
     _remembered.clear()
     return came
 
 
 class RememberedInterrupt:
-    """Lets SIGINT raise KeyboardInterrupt, as Python does, and remembers it.
+    """Lets SIGINT raise KeyboardInterrupt, as Python does, and stores the interrupt.
 
-    Ignored, as below ``nohup``, it stays so.
-
-    It is for the main thread; in others, which get no signals, it does nothing.
+    If SIGINT is ignored, as with ``nohup``, it stays ignored. Use it in the main thread. In other
+    threads, which receive no signals, it does nothing.
     """
 
     def __enter__(self) -> None:
@@ -53,7 +54,7 @@ class RememberedInterrupt:
             try:
                 self._alarm = signal.signal(signal.SIGALRM, _interrupt_again)
                 signal.signal(signal.SIGINT, _interrupt)
-            except ValueError:  # in another thread
+            except ValueError:  # not the main thread
                 self._is_set = False
 
     def __exit__(self, *_: object) -> None:
@@ -64,7 +65,7 @@ class RememberedInterrupt:
             signal.signal(signal.SIGALRM, self._alarm)
 
     def _print_unraisable(self, what: sys.UnraisableHookArgs) -> None:
-        """Let Python print what it throws away, but not an interrupt, which is remembered."""
+        """Let Python print an ignored exception, unless it is an interrupt, which is stored."""
         if what.exc_type is not KeyboardInterrupt:
             self._unraisable(what)
 
@@ -75,7 +76,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _interrupt_again(_number: int, frame: FrameType | None) -> None:
-    """Raise a pending interrupt, or retry it soon if pydantic called what runs now."""
+    """Raise a pending interrupt, or retry soon if pydantic is running."""
     if not _remembered:
         return
     while frame is not None:
@@ -86,29 +87,29 @@ def _interrupt_again(_number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-#: The signals that end a process.
+#: Signals that end a process.
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _END = b"\0"
 
 
 class Waker(Protocol):
-    """Something that ends a wait: rclpy's guard condition is one."""
+    """An object that ends a wait, such as rclpy's guard condition."""
 
     def trigger_guard_condition(self) -> None:
-        """End the wait that is under way, or else the next one."""
+        """End the current wait; without one, end the next wait at once."""
 
 
 class Stop:
-    """A flag that signals set, from the main thread's ``with`` block on until it ends.
+    """A flag that signals set during the main thread's ``with`` block.
 
-    Python runs a signal's handler only when the main thread is back from C, which a wait in ROS
-    may never be. So the number of the signal goes through Python's wake-up descriptor to a thread,
-    which sets the flag and ends the wait. Without ``with`` no signal is handled and ``request``
-    sets the flag.
+    Python runs a signal handler only when the main thread returns from C code. A wait in ROS may
+    never return. So Python's wake-up descriptor passes the number of the signal to a thread, which
+    sets the flag and ends the wait. Without ``with``, signals are not handled, and only
+    ``request`` sets the flag.
 
-    ``tfcompose up`` starts its own processes with these signals blocked, so that none meets a
-    Python that does not handle it yet. They are let through once they are handled, and blocked
-    again at the block's end.
+    ``tfcompose up`` starts its own processes with these signals blocked, so that no signal arrives
+    before Python handles it. The block unblocks them after it has installed the handlers, and
+    blocks them again at its end.
     """
 
     def __init__(self) -> None:
@@ -118,32 +119,35 @@ class Stop:
 
     @property
     def requested(self) -> bool:
-        """Whether the process is to end."""
+        """Whether the process should end."""
         return self._event.is_set()
 
     def request(self) -> None:
-        """Set the flag and end every wait, from any thread."""
+        """Set the flag and end every wait. Can be called from any thread."""
         with self._lock:
             self._event.set()
             for _, waker in self._wakers.values():
                 waker.trigger_guard_condition()
 
     def wait(self, timeout_s: float | None) -> bool:
-        """Wait until the flag is set, at most so many seconds, and return whether it is."""
+        """Wait until the flag is set, for at most ``timeout_s`` seconds.
+
+        Return whether it is set.
+        """
         return self._event.wait(timeout_s)
 
     def waker(self, owner: object, make: Callable[[], Waker]) -> Waker:
-        """Return the waker of that owner (a ROS context), made on first use.
+        """Return the waker of an owner, such as a ROS context, created on first use.
 
         ``request`` triggers it.
         """
         with self._lock:
-            known = self._wakers.get(id(owner))
-            if known is None:
-                known = self._wakers[id(owner)] = (owner, make())
+            entry = self._wakers.get(id(owner))
+            if entry is None:
+                entry = self._wakers[id(owner)] = (owner, make())
                 if self._event.is_set():
-                    known[1].trigger_guard_condition()
-            return known[1]
+                    entry[1].trigger_guard_condition()
+            return entry[1]
 
     def __enter__(self) -> Self:
         self._reader, self._writer = os.pipe()
@@ -151,7 +155,7 @@ class Stop:
         self._previous_fd = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
         ignored = (
             signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-        )  # under nohup a hang-up is meant to be ignored
+        )  # nohup ignores SIGHUP on purpose
         handled = SIGNALS[:2] if ignored else SIGNALS
         self._previous = {number: signal.signal(number, self._on_signal) for number in handled}
         self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
@@ -174,7 +178,7 @@ class Stop:
             self._wakers.clear()
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        """Do nothing: the thread that watches the wake-up descriptor does it, at once."""
+        """Do nothing, because the thread that reads the wake-up descriptor acts at once."""
 
     def _watch(self) -> None:
         while (numbers := os.read(self._reader, 64)) and _END[0] not in numbers:

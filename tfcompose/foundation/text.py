@@ -1,4 +1,4 @@
-"""Numbers, lists and durations as people read them."""
+"""Numbers, lists and durations as text for people."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-#: How many names of a list are shown.
+#: Maximum number of names to print from a list.
 LISTED = 6
 
 
 def plural(number: int, noun: str) -> str:
-    """Return the number with the noun, pluralised if needed: "1 edge", "2 edges"."""
+    """Return the number with the noun in singular or plural: "1 edge", "2 edges"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def with_more(first: str, more: int, noun: str = "edge") -> str:
-    """Return the first name, and how many there are besides: "a and 2 more edges"."""
+    """Return the first name and the number of further names: "a and 2 more edges"."""
     return f"{first} and {plural(more, f'more {noun}')}" if more else first
 
 
 def list_names(names: Iterable[object], most: int = LISTED) -> str:
-    """Return names with commas, and how many more there are than the first few.
+    """Return the first names separated by commas, and the number of further names.
 
-    "a, b and 3 more".
+    For example, "a, b and 3 more".
     """
     some = [str(name) for name in names]
     more = f" and {len(some) - most} more" if len(some) > most else ""
@@ -32,7 +32,7 @@ def list_names(names: Iterable[object], most: int = LISTED) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return how long a time is, without its sign: 120 ms, 3.2 s, 2.5 h, 12 days."""
+    """Return a duration without its sign as text: 120 ms, 3.2 s, 2.5 h, 12 days."""
     size = abs(seconds)
     if size < 1:
         return f"{size * 1000:.0f} ms"
@@ -42,7 +42,7 @@ def duration(seconds: float) -> str:
 
 
 def visible(text: str) -> str:
-    """Return the text with invisible characters, such as control characters, as Python escapes."""
+    """Return the text with invisible characters, such as control characters, escaped."""
     return "".join(map(_visible_character, text))
 
 
@@ -51,7 +51,7 @@ def _visible_character(character: str) -> str:
 
 
 def mask_invisible(text: str, mark: str, kept: str = "") -> str:
-    """Return the text with a mark for each invisible character, except those of ``kept``."""
+    """Return the text with a mark for each invisible character, except characters in ``kept``."""
     if text.isprintable():
         return text
     hidden = {character for character in text if not character.isprintable()} - {*kept}

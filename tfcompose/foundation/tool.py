@@ -1,10 +1,11 @@
-"""Description of a tool, and the one place where the core finds tools.
+"""Description of a tool, and the only place where the core finds tools.
 
-A tool adds commands, codes, topics and keys of the robot file to the core. Those that ship stand
-in the table of ``tfcompose.tools``; other packages bring theirs by the entry-point group
-``tfcompose.tools``. No wing imports a tool: ``shipped`` loads the table by its name, and returns
-nothing where that folder is absent; ``installed`` adds the tools of other packages. What a tool
-does is named as ``module:attribute`` and loaded when it is used, so the table costs little.
+A tool adds commands, codes, topics and keys of the robot file to the core. The table in
+``tfcompose.tools`` lists the tools that are part of tfcompose. Other packages add tools through
+the entry-point group ``tfcompose.tools``. No wing imports a tool. ``shipped_tools`` loads the
+table by name, and returns nothing if that folder is missing. ``installed_tools`` adds the tools of
+other packages. A tool refers to its functions as ``module:attribute``. They are loaded only when
+used, so the table loads fast.
 """
 
 from __future__ import annotations
@@ -21,30 +22,32 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-#: The package with the table of the tools that ship, ``TOOLS``; the only name by which the core
-#: knows it.
+#: The package with the table ``TOOLS`` of tfcompose's own tools. The core knows it only by this
+#: name.
 SHIPPED = "tfcompose.tools"
-#: The entry-point group of tools from other packages; each entry leads to a ``Tool``.
+#: The entry-point group of tools in other packages. Each entry refers to a ``Tool``.
 GROUP = "tfcompose.tools"
-#: Codes of other packages' tools have a prefix of their own: ACME101.
+#: Pattern of codes of tools in other packages, which have their own prefix, such as ACME101.
 _FOREIGN_CODE = re.compile(r"(?!TF\d)[A-Z]{2,8}\d{3}")
 
 
 class Command(NamedTuple):
     """A command, in a module with ``arguments(parser)`` and ``run(arguments)``.
 
-    The module's docstring is the help.
+    The module's docstring is the help of the command.
     """
 
     name: str
     summary: str
     module: str
     group: str = "Tools"
-    #: The page that ``help`` prints below the options; default: the one with the command's name.
+    #: The topic that ``help`` prints below the options, by default the topic with the command's
+    #: name.
     topic: str = ""
-    #: Pairs of an argument and the section of the robot file whose names it takes.
+    #: Pairs of an argument and a section of the robot file. Shell completion offers the section's
+    #: names.
     completes: tuple[tuple[str, str], ...] = ()
-    #: Pairs of a word that other programs use for it, and what to type instead.
+    #: Pairs of another program's word for the command, and what to type instead.
     synonyms: tuple[tuple[str, str], ...] = ()
 
 
@@ -57,9 +60,9 @@ class Topic(NamedTuple):
 
 
 class Key(NamedTuple):
-    """A section of the robot file, with its own model, validated like every other section.
+    """A section of the robot file with its own model, validated like every other section.
 
-    The hooks run only for robots whose file has the key.
+    Its hooks run only for robots whose file has the section.
     """
 
     name: str
@@ -67,25 +70,26 @@ class Key(NamedTuple):
     model: str
     about: str
     examples: tuple[Any, ...] = ()
-    #: A function of a ``ToolSection`` that returns processes for the robot to start. With the
-    #: ``argv`` ``(PROGRAM, COMMAND, …)`` a process runs a command of the tool.
+    #: A function that takes a ``ToolSection`` and returns processes for the robot to start. A
+    #: process with the ``argv`` ``(PROGRAM, COMMAND, …)`` runs a command of the tool.
     processes: str = ""
-    #: A function of a ``ToolSection`` and the ``Robot`` that returns findings; it may read files.
+    #: A function that takes a ``ToolSection`` and the ``Robot`` and returns findings. It may read
+    #: files.
     check: str = ""
-    #: A module with rules, as ``tfcompose.compiler.check.rule.rule`` makes them.
+    #: A module with rules, made by ``tfcompose.compiler.check.rule.rule``.
     rules: str = ""
-    #: Whether the section is in the plan: ``Plan.sections[name]`` is its model as JSON.
+    #: Whether the plan contains the section: ``Plan.sections[name]`` is its model as JSON.
     in_plan: bool = False
 
     def __hash__(self) -> int:
-        """Return the hash of what identifies it: examples may be lists and mappings."""
+        """Return a hash of name and model, because examples may be unhashable."""
         return hash((self.name, self.model))
 
 
 class Language(NamedTuple):
-    """A kind of file of its own, for ``schema``.
+    """A kind of file with its own language, for ``schema``.
 
-    Its name, its model, and the heading of its reference.
+    It has a name, a model, and the title of its reference.
     """
 
     name: str
@@ -96,8 +100,8 @@ class Language(NamedTuple):
 class Option(NamedTuple):
     """Options that a tool adds to commands of the core.
 
-    The module has ``arguments(parser)`` and ``run(name, arguments)``, which returns an exit code,
-    or None for the command itself to go on.
+    The module has ``arguments(parser)`` and ``run(name, arguments)``. ``run`` returns an exit
+    code, or None to continue with the command itself.
     """
 
     commands: tuple[str, ...]
@@ -106,37 +110,38 @@ class Option(NamedTuple):
 
 
 class Tool(NamedTuple):
-    """Everything that a tool brings."""
+    """All contributions of a tool."""
 
     name: str
-    #: The package with the folder ``topics``: the tool's topics and the pages of its commands.
+    #: The package with the folder ``topics``, which has the tool's topics and its commands' pages.
     package: str
     commands: tuple[Command, ...] = ()
-    #: The package with the folder ``codes``, the pages of its codes; empty if it has none.
+    #: The package with the folder ``codes``, which has the pages of its codes; empty without
+    #: codes.
     codes: str = ""
     topics: tuple[Topic, ...] = ()
     keys: tuple[Key, ...] = ()
     languages: tuple[Language, ...] = ()
     options: tuple[Option, ...] = ()
-    #: The extra of tfcompose that installs what it needs; empty if it needs nothing.
+    #: The extra of tfcompose that installs its dependencies; empty without dependencies.
     extra: str = ""
-    #: A function of a ``Plan`` that returns findings before anything starts on a machine, also
-    #: when a robot is deployed to it. It runs for plans with a section of the tool or a process
-    #: that runs a command of the tool, and gets the share of the machine.
+    #: A function that takes a machine's share of a ``Plan`` and returns findings before anything
+    #: starts, also at a deployment. It runs for plans with a section of the tool, or with a
+    #: process that runs a command of the tool.
     preflight: str = ""
 
     @property
     def topic_folder(self) -> Path:
-        """The folder of its topics and of the pages of its commands."""
+        """The folder of its topics and its commands' pages."""
         return _folder(self.package) / "topics"
 
     @property
     def code_folder(self) -> Path | None:
-        """The folder of its codes; None if it has none."""
+        """The folder of its codes, None without codes."""
         return _folder(self.codes) / "codes" if self.codes else None
 
     def names(self) -> Iterator[tuple[str, str]]:
-        """Yield everything it brings under a unique name, as (kind, name)."""
+        """Yield everything that needs a unique name, as (kind, name)."""
         yield from (("command", command.name) for command in self.commands)
         yield from (("code", code) for code in self.code_names())
         yield from (("topic", topic.name) for topic in self.topics)
@@ -145,16 +150,13 @@ class Tool(NamedTuple):
         yield from (("option", flag) for option in self.options for flag in option.flags)
 
     def code_names(self) -> list[str]:
-        """Return its codes: the names of their files."""
+        """Return its codes, from the names of their files."""
         folder = self.code_folder
         return [] if folder is None else sorted(file.stem for file in folder.glob("*.md"))
 
 
 class Problem(NamedTuple):
-    """What is wrong with a tool of another package.
-
-    The code of the finding, its message and its help.
-    """
+    """A fault of a tool in another package: code, message and help of a finding."""
 
     code: str
     message: str
@@ -162,7 +164,7 @@ class Problem(NamedTuple):
 
 
 class Toolset(NamedTuple):
-    """Tools that go together, and what is wrong with those that were left out."""
+    """Tools without conflicts, and problems of tools that were left out."""
 
     tools: tuple[Tool, ...]
     problems: tuple[Problem, ...] = ()
@@ -184,7 +186,7 @@ class Toolset(NamedTuple):
         return {language.name: language for tool in self.tools for language in tool.languages}
 
     def options(self, command: str) -> list[Option]:
-        """Return the options that a command of the core gets."""
+        """Return the options that tools add to a command of the core."""
         return [
             option for tool in self.tools for option in tool.options if command in option.commands
         ]
@@ -195,7 +197,7 @@ def _folder(package: str) -> Path:
 
 
 def load(reference: str) -> Any:
-    """Return what ``module:attribute``, or a module's name alone, leads to."""
+    """Return the object that ``module:attribute`` names, or the module without an attribute."""
     module, _, attribute = reference.partition(":")
     loaded = import_module(module)
     return getattr(loaded, attribute) if attribute else loaded
@@ -203,7 +205,7 @@ def load(reference: str) -> Any:
 
 @cache
 def shipped_tools() -> Toolset:
-    """Return the tools that ship; none where their folder is absent."""
+    """Return tfcompose's own tools; none if their folder is missing."""
     try:
         table = import_module(SHIPPED)
     except ModuleNotFoundError as error:
@@ -215,7 +217,7 @@ def shipped_tools() -> Toolset:
 
 @cache
 def installed_tools() -> Toolset:
-    """Return the tools that ship, then those of other packages without clashes."""
+    """Return tfcompose's own tools, then tools of other packages without conflicts."""
     entries = _entry_points()
     if not entries:
         return shipped_tools()
@@ -265,32 +267,32 @@ def _wrong_codes(tool: Tool) -> Iterator[Problem]:
 
 
 def code_folders() -> Iterator[Path]:
-    """Yield the folders with the codes of the tools that ship, then of the others.
+    """Yield the folders with codes of tfcompose's tools, then of other tools.
 
-    Those are looked up when reached.
+    Other tools are looked up only when they are reached.
     """
     for toolset in (shipped_tools, installed_tools):
         yield from filter(None, (tool.code_folder for tool in toolset().tools))
 
 
 def absent(name: str, *kinds: str) -> str:
-    """Return what installs the tool that ships and has this name, of one of these kinds.
+    """Return how to install the missing tool that has this name of one of these kinds.
 
-    Empty if none has.
+    Empty if no tool has it.
     """
     entries = (_reserved_names().get((kind, name)) for kind in kinds)
     tool, extra = next(filter(None, entries), ("", ""))
-    if not extra or any(other.name == tool for other in shipped_tools().tools):
+    if not extra or any(shipped.name == tool for shipped in shipped_tools().tools):
         return ""
     return f"{name} belongs to the tool {tool}, which is not installed: pip install '{extra}'"
 
 
 @cache
 def _reserved_names() -> dict[tuple[str, str], tuple[str, str]]:
-    """Return who owns each name of the core and of the tools that ship, with what installs that.
+    """Return the owner of each name of the core and its tools, with how to install the owner.
 
-    The file is written by ``python -m tests.support.names --write``: it also answers where a tool
-    is absent.
+    ``python -m tests.support.names --write`` writes the file, so the names are known even if a
+    tool is missing.
     """
     from json import loads
 
@@ -307,7 +309,7 @@ _NAMES = Path(__file__).parents[1] / "data" / "names.json"
 
 
 def _entry_points() -> list[tuple[str, str]]:
-    """Return the entry points of the group, as (name, reference), by name."""
+    """Return the entry points of the group as (name, reference), sorted by name."""
     if not any(map(_may_hold_tools, sys.path)):
         return []
     from importlib.metadata import entry_points
@@ -316,9 +318,9 @@ def _entry_points() -> list[tuple[str, str]]:
 
 
 def _may_hold_tools(folder: str) -> bool:
-    """Return whether a package in a folder of ``sys.path`` has entry points of the group.
+    """Return whether a package in a folder of ``sys.path`` may have entry points of the group.
 
-    Most installations have none, and ``importlib.metadata`` takes longer to load than all of
+    Most installations have none, and loading ``importlib.metadata`` takes longer than all of
     ``--help``.
     """
     section = f"[{GROUP}]".encode()
@@ -330,7 +332,7 @@ def _may_hold_tools(folder: str) -> bool:
     except OSError:
         return False
     for place in places:
-        # Of some hundred packages, pathlib and decoding take 20 ms.
+        # For some hundred packages, pathlib and decoding would take 20 ms.
         with contextlib.suppress(OSError), open(f"{place}/entry_points.txt", "rb") as file:  # noqa: PTH123
             if section in file.read():
                 return True

@@ -1,8 +1,8 @@
 """Trees of frames: descendants, ancestors, roots, loops, and drawing as text.
 
-Edges are (parent, child) pairs of names. What was declared or seen need be no tree: a frame may
-have several parents, and frames may be each other's ancestors. Every function here ends all the
-same, and says what it makes of that.
+Edges are (parent, child) pairs of names. Declared or observed edges need not form a tree. A frame
+may have several parents, and frames may be ancestors of each other. Every function in this module
+terminates for such edges, except ``draw_tree``, and its docstring states the result.
 """
 
 from __future__ import annotations
@@ -16,43 +16,43 @@ if TYPE_CHECKING:
 
 _Item = TypeVar("_Item")
 
-#: So many levels are indented in a drawing: the width of all lines grows with the depth of one.
+#: Maximum number of indented levels in a drawing, because the depth of a branch widens all lines.
 DEEPEST_DRAWN = 50
 
 
 def children_of(edges: Iterable[Edge]) -> dict[str, list[str]]:
-    """Return the children of each parent, in the order of the edges; a child comes once."""
-    found: dict[str, dict[str, None]] = {}
+    """Return the children of each parent without duplicates, in the order of the edges."""
+    children: dict[str, dict[str, None]] = {}
     for parent, child in edges:
-        found.setdefault(parent, {})[child] = None
-    return {parent: list(children) for parent, children in found.items()}
+        children.setdefault(parent, {})[child] = None
+    return {parent: list(children) for parent, children in children.items()}
 
 
 def parents_of(edges: Iterable[Edge]) -> dict[str, list[str]]:
-    """Return the parents of each child, in the order of the edges; a parent comes once."""
+    """Return the parents of each child without duplicates, in the order of the edges."""
     return children_of((child, parent) for parent, child in edges)
 
 
 def below(children: Mapping[str, Sequence[str]], frame: str) -> set[str]:
     """Return the frame and every frame below it."""
-    found, waiting = {frame}, [frame]
+    reached, waiting = {frame}, [frame]
     while waiting:
-        new = [child for child in children.get(waiting.pop(), ()) if child not in found]
-        found.update(new)
+        new = [child for child in children.get(waiting.pop(), ()) if child not in reached]
+        reached.update(new)
         waiting += new
-    return found
+    return reached
 
 
 def trees(edges: Iterable[Edge]) -> dict[str, set[str]]:
     """Return the frames of each tree by its root, the largest tree first, then by name.
 
-    A frame with parents in two trees is in both; frames in a loop that hangs on no root are in
-    none.
+    A frame with parents in two trees is in both. Frames of a loop without a root above it are in
+    no tree.
     """
     children = children_of(edges)
     has_parent = {child for some in children.values() for child in some}
-    found = {root: below(children, root) for root in sorted(children.keys() - has_parent)}
-    return dict(sorted(found.items(), key=lambda item: -len(item[1])))
+    frames_by_root = {root: below(children, root) for root in sorted(children.keys() - has_parent)}
+    return dict(sorted(frames_by_root.items(), key=lambda item: -len(item[1])))
 
 
 def way_up(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
@@ -66,11 +66,10 @@ def way_up(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
 
 
 def loop_closed_by(edge: Edge, parent_of: Callable[[str], str | None]) -> tuple[str, ...]:
-    """Return the loop that a further edge closes, from its child down to that again.
+    """Return the loop that an additional edge closes, from its child down to its child.
 
-    () if it closes none.
-
-    ``parent_of`` says which parent a frame has; what it says of the edge's child does not matter.
+    Empty if it closes none. ``parent_of`` returns the parent of a frame. Its result for the edge's
+    child is ignored.
     """
     parent, child = edge
     way = way_up(parent, lambda frame: None if frame == child else parent_of(frame))
@@ -78,23 +77,22 @@ def loop_closed_by(edge: Edge, parent_of: Callable[[str], str | None]) -> tuple[
 
 
 def loops(edges: Iterable[Edge]) -> list[tuple[str, ...]]:
-    """Return each loop once, from its first frame by name downwards.
+    """Return each loop once, from its alphabetically first frame downwards.
 
-    At most one for each frame that is in loops.
-
-    A frame that is its own parent is a loop of one.
+    Each frame in loops contributes at most one loop. A frame that is its own parent is a loop of
+    length 1.
     """
     parents = _around_loops(parents_of(edges))
-    found: dict[frozenset[str], tuple[str, ...]] = {}
-    done: set[str] = set()  # frames whose only way up is a loop that was found
+    cycles: dict[frozenset[str], tuple[str, ...]] = {}
+    done: set[str] = set()  # frames whose only way up is a known loop
     for start in sorted(parents):
         loop = () if start in done else _shortest_loop(parents, start)
         if all(len(parents[frame]) == 1 for frame in loop):
             done.update(loop)
-        if loop and frozenset(loop) not in found:
+        if loop and frozenset(loop) not in cycles:
             first = loop.index(min(loop))
-            found[frozenset(loop)] = (*loop[first:], *loop[:first])
-    return list(found.values())
+            cycles[frozenset(loop)] = (*loop[first:], *loop[:first])
+    return list(cycles.values())
 
 
 def _around_loops(parents: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
@@ -109,11 +107,11 @@ def _around_loops(parents: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
     while ends:
         frame = ends.pop()
         outside.add(frame)
-        for there, back in ((above, below), (below, above)):
-            for other in there.get(frame, ()):
-                back[other].discard(frame)
-                if not back[other] and other not in outside:
-                    ends.append(other)
+        for ahead, back in ((above, below), (below, above)):
+            for neighbour in ahead.get(frame, ()):
+                back[neighbour].discard(frame)
+                if not back[neighbour] and neighbour not in outside:
+                    ends.append(neighbour)
     return {
         frame: [parent for parent in some if parent not in outside]
         for frame, some in parents.items()
@@ -122,7 +120,7 @@ def _around_loops(parents: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
 
 
 def _shortest_loop(parents: Mapping[str, Sequence[str]], start: str) -> tuple[str, ...]:
-    """Return the frames from ``start`` down to it again, by the shortest way, or nothing."""
+    """Return the shortest path from ``start`` down to ``start``; empty without one."""
     came_from: dict[str, str] = {}
     waiting = [start]
     for frame in waiting:
@@ -141,11 +139,11 @@ def _shortest_loop(parents: Mapping[str, Sequence[str]], start: str) -> tuple[st
 def draw_tree(
     children: Mapping[str, Sequence[_Item]], root: str, name_of: Callable[[_Item], str]
 ) -> Iterator[tuple[str, _Item]]:
-    """Yield what is below the root in the order of a drawing, each with the lines that lead to it.
+    """Yield all descendants of the root in drawing order, each with its tree lines.
 
-    ``children`` are frames, or edges to them; ``name_of`` returns the frame of one. It has to be a
-    tree: below a loop this does not end. What is deeper than ``DEEPEST_DRAWN`` stays in its
-    column, with the number of further levels.
+    ``children`` are frames or edges; ``name_of`` returns the frame of an item. The frames must
+    form a tree, because the function does not end below a loop. Levels deeper than
+    ``DEEPEST_DRAWN`` are not indented further, and show the number of further levels.
     """
 
     def level(frame: str, indent: str, depth: int) -> list[tuple[str, int, _Item, bool]]:

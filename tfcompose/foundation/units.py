@@ -1,8 +1,8 @@
-"""Quantities with units, and the types of numbers that a robot file is made of.
+"""Quantities with units, and the types of the numbers in robot files.
 
-A dimension is the exponents of metre, kilogram, second and radian. A bare number has whatever
-dimension is asked for. A type such as ``Length`` is a float in SI to whoever uses it, and a number
-or ``30 cm`` to whoever writes it.
+A dimension consists of the exponents of metre, kilogram, second and radian. A number without a
+unit has the dimension that its key requires. In code, a type such as ``Length`` is a float in SI.
+In a file, it is a number or a text such as ``30 cm``.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ DIMENSION_NAMES: dict[Dimension, str] = {
     ROTATIONAL_DAMPING: "damping",
 }
 
-#: Unit, its size in SI, its dimension. International inch and foot are exact since 1959; 1 lb =
+#: Units, with size in SI and dimension. International inch and foot are exact since 1959; 1 lb is
 #: 0.45359237 kg.
 UNITS: dict[str, tuple[float, Dimension]] = {
     "m": (1.0, LENGTH),
@@ -91,8 +91,8 @@ UNITS: dict[str, tuple[float, Dimension]] = {
     "Nms/rad": (1.0, ROTATIONAL_DAMPING),
 }
 
-# Units whose size is a fraction, as numerator and denominator: 30 cm is 0.3 and 12 in are 0.3048,
-# to the last bit.
+# Units whose size is a fraction, as numerator and denominator, so that 30 cm is exactly 0.3 and 12
+# in exactly 0.3048.
 _FRACTIONS: dict[str, tuple[float, float]] = {
     "cm": (1, 100),
     "mm": (1, 1000),
@@ -116,14 +116,14 @@ _QUANTITY = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A value in SI with its dimension, as an expression gives it."""
+    """A value in SI with its dimension, as the result of an expression."""
 
     value: float
     dimension: Dimension = NUMBER
 
 
-#: A variable in the notation of a shell, of launch files or of templates; or names and numbers in
-#: an expression.
+#: A variable in the notation of a shell, a launch file or a template; or an expression of names
+#: and numbers.
 _NAMED = re.compile(
     r"(?:\$\(\s*(?:var|arg)\s+|\{\{\s*|\$)([\w.]+)\s*(?:\)|\}\})?"
     r"|([A-Za-z_]\w*(?:\s*[-+*/]\s*[\w.]+)*)"
@@ -132,7 +132,7 @@ _NAMED = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """True or false, as an expression gives it."""
+    """A boolean as the result of an expression."""
 
     value: bool
 
@@ -142,9 +142,9 @@ _ARITHMETIC = re.compile(r"[-+(\s]*[\d.][\d.e()\s]*[-+*/][-+*/().\de\s]*")
 
 
 class UnitError(ValueError):
-    """A string is not a quantity.
+    """A text is not a quantity.
 
-    ``advice`` says what to write instead, ``unit`` is the unit that is not known.
+    ``advice`` tells what to write instead, and ``unit`` is the unknown unit.
     """
 
     def __init__(self, message: str, advice: str = "", unit: str = "") -> None:
@@ -153,17 +153,17 @@ class UnitError(ValueError):
         self.unit = unit
 
 
-def quantity(text: str, wanted: Dimension | None = None) -> Quantity:
-    """Return what a text such as ``30 cm`` or ``1e-3`` says.
+def quantity(text: str, dimension: Dimension | None = None) -> Quantity:
+    """Return the quantity of a text such as ``30 cm`` or ``1e-3``.
 
-    ``wanted`` is the dimension that advice is given for.
+    ``dimension`` is the required dimension, for advice only.
 
     Raises:
-        UnitError: if it is no number, or its unit is not known.
+        UnitError: if it is not a number, or its unit is unknown.
     """
     match = _QUANTITY.fullmatch(text)
     if not match:
-        sample = "30 cm" if wanted is None else example(wanted)
+        sample = "30 cm" if dimension is None else example(dimension)
         advice = f"write a number such as 0.5, or a number and a unit such as {sample}"
         named = _NAMED.fullmatch(text.strip())
         if named and not {text.strip().lower()} & {*UNITS, "inf", "nan"}:
@@ -177,19 +177,19 @@ def quantity(text: str, wanted: Dimension | None = None) -> Quantity:
     number, unit = float(match[1]), match[2]
     if not math.isfinite(number):
         raise UnitError(f"{text!r} is not finite")
-    return in_unit(number, unit, wanted) if unit else Quantity(number)
+    return in_unit(number, unit, dimension) if unit else Quantity(number)
 
 
-def in_unit(number: float, unit: str, wanted: Dimension | None = None) -> Quantity:
+def in_unit(number: float, unit: str, required: Dimension | None = None) -> Quantity:
     """Return ``number`` times the unit.
 
-    ``wanted`` is the dimension that advice is given for, None: any.
+    ``required`` is the required dimension, for advice only; None for any.
 
     Raises:
-        UnitError: if the unit is not known, or the result too large for a number.
+        UnitError: if the unit is unknown, or the result is too large for a number.
     """
     if unit not in UNITS:
-        raise UnitError(f"unknown unit {unit}", _instead_of(unit, wanted), unit)
+        raise UnitError(f"unknown unit {unit}", _instead_of(unit, required), unit)
     factor, dimension = UNITS[unit]
     above, below = _FRACTIONS.get(unit, (factor, 1))
     value = math.radians(number) if unit == "deg" else number * above / below
@@ -198,18 +198,18 @@ def in_unit(number: float, unit: str, wanted: Dimension | None = None) -> Quanti
     return Quantity(value, dimension)
 
 
-def _instead_of(unit: str, wanted: Dimension | None) -> str:
-    """Return the unit of the dimension (None: any) that is probably meant, or all."""
-    known = [name for name, (_, its) in UNITS.items() if wanted in {None, its}]
-    if _SPELLINGS.get(unit) in known:
+def _instead_of(unit: str, dimension: Dimension | None) -> str:
+    """Return the unit of the dimension that the user probably intended, or all units."""
+    units = [name for name, (_, its) in UNITS.items() if dimension in {None, its}]
+    if _SPELLINGS.get(unit) in units:
         return f"write {_SPELLINGS[unit]}"
-    what = "known units" if wanted is None else f"units of {dimension_name(wanted)}"
+    what = "known units" if dimension is None else f"units of {dimension_name(dimension)}"
     return did_you_mean(
-        unit, known, f"{what}: {', '.join(known)}" if known else "leave the unit out"
+        unit, units, f"{what}: {', '.join(units)}" if units else "leave the unit out"
     )
 
 
-#: How else people write units, and their name here.
+#: Other spellings of units, with their names in this language.
 _SPELLINGS = {
     spelling: unit
     for unit, spellings in {
@@ -241,29 +241,29 @@ _SPELLINGS = {
 
 
 def respelt(text: str, unit: str, dimension: Dimension) -> str | None:
-    """Return the quantity with the only unit of the dimension that fits ``unit``, or None."""
-    known = [name for name, (_, its) in UNITS.items() if its == dimension]
-    unit_meant = _SPELLINGS.get(unit) or _SPELLINGS.get(unit.lower()) or slip_of(unit, known)
-    if unit_meant not in known or not text.rstrip().endswith(unit):
+    """Return the quantity with the only similar unit of the dimension, None without one."""
+    units = [name for name, (_, its) in UNITS.items() if its == dimension]
+    unit_meant = _SPELLINGS.get(unit) or _SPELLINGS.get(unit.lower()) or slip_of(unit, units)
+    if unit_meant not in units or not text.rstrip().endswith(unit):
         return None
     return text.rstrip().removesuffix(unit) + str(unit_meant)
 
 
 def dimension_name(dimension: Dimension) -> str:
-    """Return what people call the dimension, or its exponents where it has no name."""
+    """Return the name of the dimension, or its exponents if it has no name."""
     named = DIMENSION_NAMES.get(dimension)
     powers = zip(("m", "kg", "s", "rad"), dimension, strict=True)
     return named or " ".join(f"{base}^{power}" for base, power in powers if power)
 
 
 def with_article(dimension: Dimension) -> str:
-    """Return what people call one quantity of the dimension: ``a length``, ``an angle``."""
+    """Return the name of the dimension with an article: ``a length``, ``an angle``."""
     name = dimension_name(dimension)
     return f"an {name}" if name[0] in "aeiou" else f"a {name}"
 
 
 def example(dimension: Dimension) -> str:
-    """Return one way to write a quantity of the dimension."""
+    """Return an example of a quantity with the dimension."""
     return _EXAMPLES.get(dimension, "1")
 
 
@@ -284,17 +284,17 @@ _EXAMPLES = {
 
 
 def invalid(code: str, message: str, help: str = "", **more: Any) -> PydanticCustomError:  # noqa: A002
-    """Return the error that a validator raises: the finding's code, its message and its help.
+    """Return the error that a validator raises, with code, message and help of a finding.
 
-    ``more`` is ``on_key`` (the key is wrong, not its value), ``other`` (the key beside it that it
-    conflicts with), ``instead`` (the key or string that belongs there, where only one can be
-    meant), and ``keeps`` (the value itself is sound, and later stages can go on with it).
+    ``more`` may contain ``on_key`` (the key is wrong, not its value), ``conflicts_with`` (the
+    conflicting key in the same mapping), ``instead`` (the only possible correct key or string),
+    and ``keeps`` (later stages can use the value).
     """
     return PydanticCustomError(code, "{message}", {"message": message, "help": help, **more})
 
 
 def format_value(value: Any) -> str:
-    """Return how a value is named in a message: short, and as it stands in YAML."""
+    """Return a value for a message: short, and as it is written in YAML."""
     value = value.value if isinstance(value, Truth) else value
     if isinstance(value, bool) or value is None:
         return {True: "true", False: "false", None: "null"}[value]
@@ -308,36 +308,36 @@ _LONGEST_SHOWN = 60
 
 
 class WithUnit(float):
-    """A number in SI that the file gives with a unit; a number without one is a plain float."""
+    """A number in SI that has a unit in the file. A number without a unit is a plain float."""
 
     __slots__ = ()
 
 
-#: Beyond this, and for sizes and masses below its inverse, products of four such numbers leave the
-#: range of floats.
+#: Above this limit, and below its inverse for sizes and masses, products of four numbers would
+#: overflow or underflow a float.
 LARGEST = 1e30
 SMALLEST = 1 / LARGEST
 
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """Annotates a float that may be written with a unit."""
+    """Annotates a float that may have a unit in the file."""
 
-    #: Its dimension; with ``sliding``, the one for joints that turn.
+    #: The dimension; with ``sliding``, the dimension for joints that rotate.
     dimension: Dimension
-    #: The smallest value that it can have.
+    #: The smallest allowed value.
     least: float | None = None
     #: The dimension for joints that slide.
     sliding: Dimension | None = None
 
     @property
     def dimensions(self) -> tuple[Dimension, ...]:
-        """What it can be."""
+        """The possible dimensions."""
         return (self.dimension, self.sliding) if self.sliding else (self.dimension,)
 
     @property
     def unit(self) -> str:
-        """The SI unit of a bare number, in words; empty for a number without one."""
+        """The SI unit of a number without a unit, as text; empty for a dimensionless number."""
         return (
             ""
             if self.dimension == NUMBER
@@ -346,20 +346,21 @@ class Measure:
 
     @property
     def example(self) -> str:
-        """One way to write it."""
+        """An example of a value."""
         return example(self.dimension)
 
     @property
     def about(self) -> str:
-        """What a bare number is, and how else it can be written."""
-        return f"in {self.unit}, or with a unit: {' or '.join(map(example, self.dimensions))}"
+        """The meaning of a number without a unit, and examples with units."""
+        examples = " or ".join(filter(None, map(_EXAMPLES.get, self.dimensions)))
+        return f"in {self.unit}, or with a unit: {examples}" if examples else f"in {self.unit}"
 
     def read(self, value: Any) -> float:
         """Return the value in SI.
 
         Raises:
-            PydanticCustomError: if it is no number, too large or too small, or its unit is unknown
-                or another kind's.
+            PydanticCustomError: if it is not a number, is too large or too small, or its unit is
+                unknown or of another dimension.
         """
         number = self._in_si(value)
         if self.least is not None and number < self.least:
@@ -377,20 +378,22 @@ class Measure:
         return value if kind is float else value if isinstance(value, WithUnit) else float(value)
 
     def _convert(self, value: Any) -> float:
-        wanted = self.dimensions[-1]
+        dimension = self.dimensions[-1]
         if isinstance(value, str):
             try:
-                value = quantity(value, wanted)
+                value = quantity(value, dimension)
             except UnitError as error:
-                instead = respelt(value, error.unit, wanted) if error.unit else None
-                message = f"{error}; expected {with_article(wanted)}"
+                instead = respelt(value, error.unit, dimension) if error.unit else None
+                message = f"{error}; expected {with_article(dimension)}"
                 raise invalid(
                     "TF104" if error.unit else "TF103", message, error.advice, instead=instead
                 ) from None
         if isinstance(value, Quantity):
             if value.dimension not in {NUMBER, *self.dimensions}:
-                message = f"expected {with_article(wanted)}, not {with_article(value.dimension)}"
-                raise invalid("TF104", message, f"for example {example(wanted)}")
+                message = (
+                    f"expected {with_article(dimension)}, not {with_article(value.dimension)}"
+                )
+                raise invalid("TF104", message, f"for example {example(dimension)}")
             return value.value if value.dimension == NUMBER else WithUnit(value.value)
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return value
@@ -410,10 +413,10 @@ class Measure:
         return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": pattern}]}
 
 
-#: The pattern of a string with what is computed first.
+#: Pattern of a string with an expression, which is computed before validation.
 EXPRESSION = r"\$\{"
 
-#: The SI unit of each dimension that a key can have, as people write it.
+#: The SI unit of each dimension that a key can have, as text.
 SI_UNITS: dict[Dimension, str] = {
     LENGTH: "metres",
     MASS: "kilograms",

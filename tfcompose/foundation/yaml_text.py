@@ -1,6 +1,7 @@
-"""YAML as people write robot files.
+"""YAML text as people write robot files.
 
-An entry on a line where it fits, numbers, names and words bare, all else in quotes.
+An entry is on a single line if it fits. Numbers, names and words are bare, and all other text is
+in quotes.
 """
 
 from __future__ import annotations
@@ -18,34 +19,33 @@ if TYPE_CHECKING:
 
 WIDTH = 120
 
-#: So many digits people write at most; what computing leaves behind is below this part of a
-#: number.
+#: Maximum number of digits that people write, and the relative size of rounding noise.
 _DIGITS, _LEFT_BEHIND = 12, 4e-16
 
-#: What needs no quotes: a path, an address, words, a quantity with its unit.
+#: Text that needs no quotes: a path, an address, words, a quantity with its unit.
 _PLAIN = re.compile(
     r"(?:[a-z]+://|\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./+-]*(?: [A-Za-z0-9_./+-]+)*"
     r"|-?[0-9]+(?:\.[0-9]+)? [A-Za-z%][A-Za-z/]*"
 )
-#: What readers of other versions of YAML take for something else than a text.
+#: Words that readers of other versions of YAML do not read as strings.
 _RESERVED = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf"})
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
 class Bare(str):
-    """A text that needs no quotes for another reason than its characters: a typed number."""
+    """A text to write without quotes although its characters need them, such as a typed number."""
 
     __slots__ = ()
 
 
 class Literal(str):
-    """A text of several lines, which keeps them."""
+    """A text of several lines, written as a literal block."""
 
     __slots__ = ()
 
 
 def entry(key: str, value: Any, depth: int = 0) -> list[str]:
-    """Return the lines of a key and its value: one line where it fits, else an indented block."""
+    """Return the lines of a key and its value: one line if it fits, otherwise a block."""
     before = "  " * depth
     head = f"{before}{text(key)}:"
     if isinstance(value, Literal):
@@ -67,7 +67,7 @@ def entry(key: str, value: Any, depth: int = 0) -> list[str]:
 
 
 def _splits(value: Any) -> bool:
-    """Whether the value can be split into lines: a list of numbers and ``{}`` cannot."""
+    """Return whether the value can be split into lines. Lists of numbers and ``{}`` cannot."""
     return (
         bool(value)
         if isinstance(value, dict)
@@ -85,7 +85,7 @@ def _item(value: Any, depth: int) -> list[str]:
 
 
 def flow(value: Any) -> str:
-    """Return the value on one line."""
+    """Return the value on a single line."""
     if isinstance(value, dict):
         return f"{{{', '.join(f'{text(key)}: {flow(item)}' for key, item in value.items())}}}"
     if isinstance(value, (list, tuple)):
@@ -98,9 +98,9 @@ def flow(value: Any) -> str:
 
 
 def parameter(value: Any) -> Any:
-    """Return a node's parameter such that it is written with its type.
+    """Return a node's parameter so that it is written with its type.
 
-    20.0 is a double, and 20 an integer.
+    For example, 20.0 is a double, and 20 is an integer.
     """
     if isinstance(value, list):
         return [parameter(item) for item in value]
@@ -115,16 +115,16 @@ def parameter(value: Any) -> Any:
 
 
 def _as_people_write(value: float) -> float:
-    """Return the number without what computing left in its last digits.
+    """Return the number without rounding noise in its last digits.
 
-    0.010267499999999999 was 0.0102675.
+    For example, 0.010267499999999999 becomes 0.0102675.
     """
     near = float(f"{value:.{_DIGITS}g}")
     return near if abs(near - value) <= _LEFT_BEHIND * abs(value) else value
 
 
 def text(value: str) -> str:
-    """Return a text, in quotes where YAML would take it for something else."""
+    """Return a text, in quotes if YAML would otherwise not read it as a string."""
     if isinstance(value, Bare):
         return str(value)
     if _PLAIN.fullmatch(value) and value.lower() not in _RESERVED:
@@ -137,7 +137,7 @@ def _print_char(char: str) -> str:
 
 
 def _literal(value: str) -> list[str] | None:
-    """Return the lines of a literal block, or None for a text that cannot be one."""
+    """Return the lines of a literal block, None if the text cannot be written as one."""
     lines = value.splitlines()
     ends = any(line != line.rstrip() for line in lines)
     if (
@@ -151,14 +151,14 @@ def _literal(value: str) -> list[str] | None:
 
 
 def dedent_block(block: str) -> Literal:
-    """Return an element's source text without its indentation."""
+    """Return the source text of an element without its indentation."""
     first, _, rest = block.strip().partition("\n")
     below = dedent(rest.expandtabs(2)) if rest else ""
     return Literal("\n".join(line.rstrip() for line in [first, *below.splitlines()]))
 
 
 def comment(texts: Iterable[str], depth: int = 0) -> list[str]:
-    """Return texts as lines of comment, folded where they are long."""
+    """Return texts as comment lines, with long lines folded."""
     before = "  " * depth + "# "
     lines = []
     for text in texts:
@@ -182,7 +182,10 @@ def _fold(line: str, width: int) -> list[str]:
 def section(
     name: str, entries: Mapping[str, Any], notes: Mapping[str, Iterable[str]]
 ) -> list[str]:
-    """Return a section with its entries and the comments above them; nothing for an empty one."""
+    """Return a section with its entries and the comments above them.
+
+    Empty for an empty section.
+    """
     if not entries:
         return []
     lines = ["", f"{name}:"]

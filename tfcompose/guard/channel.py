@@ -1,9 +1,9 @@
 """The guard's ends of the pipes to and from the launcher: orders, events and memory.
 
-Without a launcher there are no orders, and events go to the guard's own output. The memory is the
-state for the next guard, should this one die. The launcher keeps it without reading it:
-``model.variables.MEMORY_FD`` names the environment variable with the descriptor of a file that
-holds it, as one JSON object with a key for each pair of TF topics.
+Without a launcher there are no orders, and events go to the guard's standard output. The memory is
+the state for a new guard that replaces a guard that died. The launcher stores it without reading
+it. The environment variable ``model.variables.MEMORY_FD`` has the descriptor of a file that
+contains the memory as a JSON object, with a key for each pair of TF topics.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from tfcompose.guard.judge import Judge
     from tfcompose.guard.relay import Relay
 
-#: Events of a guard with mode off: it observes but does not judge.
+#: Events of a guard in mode ``off``, which observes but does not judge.
 _OBSERVATIONS = (
     Alive,
     Clear,
@@ -65,19 +65,19 @@ _OBSERVATIONS = (
     ComponentState,
     DescriptionState,
 )
-#: Period of the guard's sign of life to the launcher, in seconds.
+#: Interval of the guard's signs of life to the launcher, in seconds.
 ALIVE_EVERY_S = 1.0
-#: Period at which the launcher gets the current findings, in seconds, and their maximum number.
+#: Interval at which the guard sends current findings, in seconds, and their maximum number.
 FINDINGS_EVERY_S = 0.5
 MOST_FINDINGS = 100
-#: A longer part of the memory is not handed on: the launcher takes no longer lines; characters.
+#: Maximum length of a part of the memory, in characters. The launcher accepts no longer lines.
 LONGEST = 900_000
-#: The part of the memory that no topics have.
+#: Keys of the part of the memory that belongs to no pair of topics.
 _SWITCHES, _ANSWERED = "switches", "answered"
 
 
 class OrderReader:
-    """Reads the launcher's orders."""
+    """Reads and executes the launcher's orders."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class OrderReader:
             os.set_blocking(self._fd, False)
 
     def take(self) -> None:
-        """Carry out pending orders, and check the gates and components that are to load."""
+        """Execute pending orders. Check gates, and components that are to be loaded."""
         for line in self._lines():
             match GUARD_ORDERS.decode(line):
                 case Absent(process):
@@ -132,7 +132,7 @@ class OrderReader:
 
 
 class EventWriter:
-    """Writes the events of one cycle at once, so that a killed guard leaves no partial event."""
+    """Writes the events of a cycle in a single call, so that no event is written in part."""
 
     def __init__(self, *, judges: bool) -> None:
         self._judges = judges
@@ -141,7 +141,7 @@ class EventWriter:
         self._alive_due = 0.0
 
     def emit(self, event: GuardEvent) -> None:
-        """Queue an event; a guard with mode off drops its findings."""
+        """Queue an event. A guard in mode ``off`` drops findings."""
         if not self._judges and not isinstance(event, _OBSERVATIONS):
             return
         if self._pipe is not None:
@@ -150,7 +150,7 @@ class EventWriter:
             say(line_of(event).decode().rstrip())
 
     def heartbeat(self) -> None:
-        """Write a heartbeat when it is due; never block on a launcher that does not read."""
+        """Write a sign of life when it is due. Never block on a launcher that does not read."""
         now = time.monotonic()
         if self._pipe is None or now < self._alive_due:
             return
@@ -168,11 +168,11 @@ class EventWriter:
             while data:
                 data = data[os.write(self._pipe, data) :]
         except BrokenPipeError:
-            sys.exit(1)  # the launcher is gone
+            sys.exit(1)  # the launcher has ended
 
 
 class SilentEdges:
-    """Reports which live edges fell silent, and which of these are back.
+    """Reports live edges that have fallen silent, and silent edges that arrive again.
 
     The launcher does not count silent edges as live.
     """
@@ -192,17 +192,17 @@ class SilentEdges:
             self._reported,
             [child for judge in self._judges for child in judge.live.silent()],
         )
-        for children, others, over in (
+        for children, compared, over in (
             (self._reported, before, False),
             (before, self._reported, True),
         ):
-            new = sorted(set(children).difference(others))
+            new = sorted(set(children).difference(compared))
             for start in range(0, len(new), MOST_NAMED):
                 self._emit(Silent(tuple(new[start : start + MOST_NAMED]), over=over))
 
 
 class FindingsReport:
-    """Sends the current findings to the launcher whenever they change."""
+    """Sends the current findings to the launcher when they change."""
 
     def __init__(
         self, sources: Sequence[Callable[[], list[Finding]]], emit: Callable[[GuardEvent], None]
@@ -212,7 +212,7 @@ class FindingsReport:
         self._reported: tuple[Finding, ...] = ()
 
     def report(self) -> None:
-        """Report changes if a report is due."""
+        """Send the findings if they have changed and a report is due."""
         if time.monotonic() < self._due:
             return
         self._due = time.monotonic() + FINDINGS_EVERY_S
@@ -226,7 +226,7 @@ class FindingsReport:
 
 
 def recall_memory(env: Mapping[str, str]) -> dict[str, Any]:
-    """Return the state of the previous guard by topics; empty if there was none."""
+    """Return the state of the previous guard by topics; empty without a previous guard."""
     if MEMORY_FD not in env:
         return {}
     with os.fdopen(int(env[MEMORY_FD]), "rb") as file:
@@ -239,7 +239,7 @@ def recall_memory(env: Mapping[str, str]) -> dict[str, Any]:
 
 
 class Memory:
-    """Sends the state of judge and relay to the launcher, each part when it changes."""
+    """Sends the state of judge and relay to the launcher. A part is sent when it changes."""
 
     def __init__(
         self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]
@@ -257,18 +257,18 @@ class Memory:
         if mark == self._mark:
             return
         self._mark = mark
-        known = msgspec.to_builtins(self._judge.memory()) | (
+        memory = msgspec.to_builtins(self._judge.memory()) | (
             self._relay.memory() if self._relay else {}
         )
-        gone = dict.fromkeys(self._left.keys() - known.keys())
-        for part, value in (known | gone).items():
+        gone = dict.fromkeys(self._left.keys() - memory.keys())
+        for part, value in (memory | gone).items():
             if self._left.get(part) != value and len(msgspec.json.encode(value)) < LONGEST:
                 self._emit(Remember({f"{self._topics} {part}": value}))
-        self._left = known
+        self._left = memory
 
 
 class SwitchMemory:
-    """Remembers which nodes have answered for their switches, so nothing repeats."""
+    """Stores which nodes have answered for their switches, so that no request is repeated."""
 
     def __init__(
         self, switches: Switches, emit: Callable[[GuardEvent], None], left: Mapping[str, Any]

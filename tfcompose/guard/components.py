@@ -1,8 +1,8 @@
-"""Loading and unloading of components in containers, with or without a launcher's orders.
+"""Loading and unloading of components in containers, with or without orders of a launcher.
 
-A container handles one request at a time, in the order of the orders. Without a launcher, as in
-exported units and containers, the guard checks each container periodically and loads missing
-components, also after a container restarts.
+A container gets one request at a time, in the order of the orders. Exported systemd units and
+containers run without a launcher. There, the guard periodically checks each container and loads
+missing components, even after a container restarts.
 """
 
 from __future__ import annotations
@@ -25,41 +25,42 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from tfcompose.model.messages import GuardEvent, LoadState
-    from tfcompose.tf.process import Own
+    from tfcompose.tf.process import OwnProcess
     from tfcompose.tf.ros.composition import Container
 
-#: A container that does not answer an unload request within this time is left alone; seconds.
+#: Maximum time for a container's answer to a request to unload, in seconds.
 ANSWER_S = 5.0
-#: An answer that is not there by then may be lost: what the container has says it, too; seconds.
+#: If an answer is missing for this time, in seconds, it may be lost. Then the guard also asks for
+#: the container's list of components.
 LIST_AFTER_S = 2.0
-#: More often than this a component is not missing by chance: it was unloaded, or the request to
-#: load it was lost.
+#: A component may be missing from the list this often. If it is missing more often, it was
+#: unloaded, or the request to load it was lost.
 ABSENT_AT_MOST = 1
-#: Period at which the guard checks that a container has its components, in seconds.
+#: Interval between checks that a container has its components, in seconds.
 CHECK_EVERY_S = 2.0
 
 
 @dataclass(slots=True)
 class _Job:
-    """One order and its progress."""
+    """An order and its progress."""
 
     order: ComponentOrder
     request: LoadRequest
-    #: The pending request; empty before the first one.
+    #: The pending request; empty before the first request.
     step: str = ""
-    #: When the step began, in monotonic seconds.
+    #: Begin of the step, in monotonic seconds.
     since: float = 0.0
-    #: When the container was last asked for its components, in monotonic seconds.
+    #: Time of the last request for the container's list, in monotonic seconds.
     listed: float = 0.0
-    #: How often the component was missing from the container's list.
+    #: Number of lists that lacked the component.
     absent: int = 0
 
 
 class Components:
     """Pending orders by container, and the loaded components.
 
-    A component that is missing from its container is reported as unloaded: something unloaded it,
-    or replaced a container that the launcher did not start.
+    A component that is missing from its container is reported as unloaded. Either another program
+    unloaded it, or the container was replaced without the launcher.
     """
 
     def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
@@ -72,7 +73,7 @@ class Components:
         self._due = 0.0
 
     def take(self, order: ComponentOrder) -> None:
-        """Carry out an order of the launcher: it replaces one for the same component."""
+        """Execute an order of the launcher. It replaces an order for the same component."""
         try:
             request = msgspec.json.decode(Path(order.file).read_bytes(), type=LoadRequest)
         except (OSError, UnicodeDecodeError, msgspec.DecodeError) as error:
@@ -81,7 +82,7 @@ class Components:
         self.add(order, request)
 
     def add(self, order: ComponentOrder, request: LoadRequest) -> None:
-        """Carry out an order about a component, or answer that no component can be loaded."""
+        """Execute an order about a component, or answer that components cannot be loaded."""
         try:
             self._container(request.container)
         except ImportError:
@@ -94,7 +95,7 @@ class Components:
         jobs.append(_Job(order, request, since=time.monotonic()))
 
     def forget(self, process: str) -> None:
-        """Drop orders about the component, because it is stopped or its container has ended."""
+        """Drop orders about the component, because it was stopped or its container has ended."""
         self._loaded.pop(process, None)
         for name, jobs in self._jobs.items():
             self._jobs[name] = deque(job for job in jobs if job.order.process != process)
@@ -118,9 +119,9 @@ class Components:
     def _check_loaded(self, name: str, container: Container) -> None:
         """Read the container's list of components, and request it again."""
         loaded = [entry for entry in self._loaded.values() if entry[1].container == name]
-        there, is_there = container.list.answer(), container.list.is_there
-        for order, request in loaded if there or not is_there else ():
-            is_absent = there is None or request.node not in there.full_node_names
+        listing, is_there = container.list.answer(), container.list.is_there
+        for order, request in loaded if listing or not is_there else ():
+            is_absent = listing is None or request.node not in listing.full_node_names
             self._absent[order.process] = is_absent * (self._absent.get(order.process, 0) + 1)
             if self._absent[order.process] > ABSENT_AT_MOST:
                 del self._loaded[order.process]
@@ -136,7 +137,7 @@ class Components:
             container.list.ask()
 
     def _container(self, name: str) -> Container:
-        # Its messages come with containers only.
+        # Only plans with containers need its message types.
         from tfcompose.tf.ros.composition import Container  # noqa: PLC0415
 
         if name not in self._containers:
@@ -144,7 +145,7 @@ class Components:
         return self._containers[name]
 
     def _is_done(self, job: _Job, container: Container, now: float) -> bool:
-        """Continue an order; return whether it is answered."""
+        """Continue an order, and return whether it is answered."""
         if job.order.do == "load":
             return self._is_loaded(job, job.order, container, now)
         return self._is_unloaded(job, job.order, container, now)
@@ -167,15 +168,15 @@ class Components:
             )
             self._finish_load(job, order, why)
             return True
-        if (there := container.list.answer()) is not None:
-            if job.request.node in there.full_node_names:
+        if (listing := container.list.answer()) is not None:
+            if job.request.node in listing.full_node_names:
                 before = job.step == "look" and not order.again
-                self._finish_load(job, order, _already(job.request, there) if before else "")
+                self._finish_load(job, order, _already(job.request, listing) if before else "")
                 return True
             job.absent += 1
             if (
                 job.step == "look" or job.absent > ABSENT_AT_MOST
-            ):  # it carries out one request after the other
+            ):  # a container handles requests in sequence
                 return not self._begins(job, container, now, "load")
         elif now - max(job.since, job.listed) > LIST_AFTER_S and container.list.is_there:
             job.listed = now
@@ -183,9 +184,9 @@ class Components:
         return False
 
     def _begins(self, job: _Job, container: Container, now: float, step: str) -> bool:
-        """Check for the component, or load it.
+        """Request the container's list, or request to load the component.
 
-        Return False if the request is impossible, and the order answered.
+        Return False if the request is impossible. In that case the order is answered.
         """
         if step == "look" and not container.list.is_there:
             return True
@@ -210,8 +211,8 @@ class Components:
             if container.list.is_there:
                 job.step = "list"
                 container.list.ask()
-        elif job.step == "list" and (there := container.list.answer()) is not None:
-            named = dict(zip(there.full_node_names, there.unique_ids, strict=False))
+        elif job.step == "list" and (listing := container.list.answer()) is not None:
+            named = dict(zip(listing.full_node_names, listing.unique_ids, strict=False))
             if job.request.node not in named:
                 self._answer(order, "")
                 return True
@@ -237,9 +238,9 @@ class Components:
         self._emit(ComponentState(order.process, order.number, state, why))
 
 
-def _already(request: LoadRequest, there: Any) -> str:
-    """Return why a component is not loaded: the container already has a node of its name."""
-    number = there.unique_ids[list(there.full_node_names).index(request.node)]
+def _already(request: LoadRequest, listing: Any) -> str:
+    """Return why a component is not loaded: the container already has a node with its name."""
+    number = listing.unique_ids[list(listing.full_node_names).index(request.node)]
     unload = f"ros2 component unload {request.container} {number}"
     return (
         f"{request.container} has a node {request.node} already, which is not of this run:"
@@ -248,22 +249,22 @@ def _already(request: LoadRequest, there: Any) -> str:
 
 
 class ComponentDriver:
-    """The plan's components, loaded without a launcher's orders."""
+    """Loads the plan's components without orders of a launcher."""
 
-    def __init__(self, node: Node, own: Own, *, private: bool) -> None:
+    def __init__(self, node: Node, own_process: OwnProcess, *, private: bool) -> None:
         def fill(text: str) -> str:
-            return text.replace("${build_dir}", str(own.file.absolute().parent))
+            return text.replace("${build_dir}", str(own_process.file.absolute().parent))
 
         self._requests = {
-            process.name: load_request(own.plan, process, fill, private=private)
-            for process in own.plan.components
+            process.name: load_request(own_process.plan, process, fill, private=private)
+            for process in own_process.plan.components
         }
         self._components = Components(node, self._hear)
         self._due = 0.0
         self._printed: dict[str, str] = {}
 
     def check(self) -> None:
-        """Order missing components from each container, and print changes."""
+        """Order the missing components from each container, and print changes."""
         now = time.monotonic()
         if now >= self._due:
             self._due = now + CHECK_EVERY_S

@@ -1,7 +1,8 @@
-"""Passes a new robot description to running nodes: stock robot_state_publishers.
+"""Passes a new robot description to running robot_state_publishers.
 
-robot_state_publisher accepts ``robot_description`` while it runs, and sends /tf_static and the
-description again. The launcher restarts one that refuses it or does not answer.
+A stock robot_state_publisher accepts ``robot_description`` while it runs, and then publishes
+/tf_static and the description again. If a node rejects the description or does not answer, the
+launcher restarts its process.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 #: Maximum time for a node's answer, in seconds.
 ANSWER_S = 5.0
 _NAME = "robot_description"
-#: The description in a parameter file that tfcompose wrote.
+#: The line with the description in a parameter file that tfcompose wrote.
 _LINE = re.compile(rf'^ +"{_NAME}": ("[^\n]*")$', re.MULTILINE)
 
 
@@ -38,7 +39,7 @@ class Descriptions:
         self._writers: dict[str, tuple[ParameterWriter, float]] = {}
 
     def take(self, order: DescriptionOrder) -> None:
-        """Queue a description for a node, in place of one still waiting."""
+        """Queue a description for a node. It replaces a description that is still waiting."""
         self.forget(order.process)
         try:
             match = _LINE.search(Path(order.file).read_text(encoding="utf-8"))
@@ -52,13 +53,13 @@ class Descriptions:
         self._writers[order.process] = writer, time.monotonic()
 
     def forget(self, process: str) -> None:
-        """Drop the description for the process's node: it ended, or is stopped."""
+        """Drop the description for a process that ended or was stopped."""
         writer, _ = self._writers.pop(process, (None, 0.0))
         if writer:
             writer.close()
 
     def check(self) -> None:
-        """Send waiting descriptions, and report which were accepted or refused."""
+        """Send waiting descriptions, and report accepted and rejected ones."""
         for process, (writer, since) in list(self._writers.items()):
             why = writer.refusal()
             if why is None and time.monotonic() - since > ANSWER_S:

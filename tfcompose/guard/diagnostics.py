@@ -1,4 +1,4 @@
-"""The guard's knowledge edge by edge, and as /diagnostics (DiagnosticArray)."""
+"""The guard's knowledge about each edge, published on /diagnostics (DiagnosticArray)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OK, WARN, ERROR, STALE = 0, 1, 2, 3
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One line of a diagnostics page."""
+    """An entry of a diagnostics message."""
 
     name: str
     #: OK, WARN, ERROR or STALE.
@@ -53,11 +53,11 @@ class DiagnosticsPublisher:
 
     @property
     def is_heard(self) -> bool:
-        """Whether there is a subscriber."""
+        """Whether the topic has a subscriber."""
         return bool(self._publisher.get_subscription_count())
 
     def publish(self, statuses: Sequence[Status], stamp_ns: int) -> None:
-        """Publish them, stamped with this time in nanoseconds."""
+        """Publish the statuses with a stamp in nanoseconds."""
         array = self._messages.DiagnosticArray(
             status=[self._status(status) for status in statuses]
         )
@@ -85,9 +85,9 @@ def _level(edge: EdgeHealth) -> int:
 
 
 def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
-    """Return the status of the edges that a strict guard blocked.
+    """Return the status of edges that a strict guard blocked.
 
-    ``held`` counts transforms by their sender's node, parent and child.
+    ``held`` counts blocked transforms by the sender's node, parent and child.
     """
     lines = [
         (f"{parent} → {child} from {who}", str(count))
@@ -98,7 +98,7 @@ def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
 
 
 def statuses(robot: str, edges: Sequence[EdgeHealth], findings: Sequence[Finding]) -> list[Status]:
-    """Return one status for the tree, with current faults, and one for each owner."""
+    """Return a status for the tree with current faults, and a status for each owner."""
     severe = any(finding.severity == "error" for finding in findings)
     level = ERROR if severe else WARN if findings else OK
     message = (
@@ -115,7 +115,7 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], findings: Sequence[Finding
     ]
     for owner in dict.fromkeys(edge.edge.owner for edge in edges):
         owned = [edge for edge in edges if edge.edge.owner == owner]
-        # Not seen yet is worse than fine, and better than silent.
+        # Not received yet is worse than OK and better than silent.
         worst = max((_level(edge) for edge in owned), key=[OK, WARN, STALE, ERROR].index)
         number = sum(_level(edge) == worst for edge in owned)
         summary = f"{number} of {len(owned)} edges: {_NAMES[worst]}"
@@ -131,7 +131,7 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], findings: Sequence[Finding
 
 
 class DiagnosticsPage:
-    """Publishes the judges' knowledge on /diagnostics, once a second while it has subscribers."""
+    """Publishes the judges' knowledge on /diagnostics, each second while there are subscribers."""
 
     def __init__(self, node: Node, robot: str) -> None:
         self._robot = robot
@@ -145,13 +145,13 @@ class DiagnosticsPage:
     def publish(
         self,
         judges: Sequence[Judge],
-        found: Sequence[Callable[[], list[Finding]]],
+        sources: Sequence[Callable[[], list[Finding]]],
         held: Callable[[], Mapping[tuple[str, str, str], int] | None],
     ) -> None:
-        """Publish if it is due and there is a subscriber.
+        """Publish if a message is due and has a subscriber.
 
-        ``found`` return the open findings, except for silent or slow edges; ``held`` returns the
-        transforms that a strict guard blocked.
+        ``sources`` return the open findings, except for silent and slow edges. ``held`` returns
+        counts of the transforms that a strict guard blocked.
         """
         now = time.monotonic()
         if self._publisher is None or now < self._due:
@@ -159,7 +159,7 @@ class DiagnosticsPage:
         self._due = now + EVERY_S
         if self._publisher.is_heard:
             edges = [edge for judge in judges for edge in judge.health(now)]
-            wrong = [finding for findings in found for finding in findings()]
+            wrong = [finding for findings in sources for finding in findings()]
             page = statuses(self._robot, edges, wrong)
             if (counts := held()) is not None:
                 page.append(held_status(self._robot, counts))

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.topics import TFData
     from tfcompose.tf.ros.tf_codec import SentTransform
 
-#: Maximum time of one read, in seconds; while a flood remains to be read, the guard waits at most
-#: the second time.
+#: Maximum duration of a read, and maximum wait of the guard while a message remains to be read; in
+#: seconds.
 SLICE_S, WAIT_S = 0.001, 0.01
 _TOGETHER = 50
 
@@ -24,9 +24,9 @@ _TOGETHER = 50
 class FloodReader:
     """Extracts the declared edges from long messages, as separate messages.
 
-    ``children`` are the frames whose edges are declared. A message that arrives while another is
-    read is skipped and counted in ``skipped``. Reading takes at most a fixed part of each second,
-    for all flooding publishers together.
+    ``children`` are the child frames of declared edges. A message that arrives while another
+    message is being read is skipped, and counted in ``skipped``. Reading takes at most a fixed
+    part of each second for all flooding publishers together.
     """
 
     def __init__(self, children: Collection[str]) -> None:
@@ -39,18 +39,21 @@ class FloodReader:
 
     @property
     def is_reading(self) -> bool:
-        """Whether there are messages to read, and time left in this second."""
+        """Whether a message remains to be read and time is left in this second."""
         return self._data is not None and self._spent_s <= BUSY_S
 
     def add(self, data: TFData) -> None:
-        """Take a message to read, unless one is being read."""
+        """Accept a message to read, unless another message is being read."""
         if self._data is not None:
             self.skipped += 1
             return
         self._data, self._rest, self._transforms = data, transforms(data.received.data), []
 
     def read(self, now: float) -> TFData | None:
-        """Continue reading briefly; return the message's declared edges once it is complete."""
+        """Continue reading for a short time.
+
+        Return the declared edges of a completely read message.
+        """
         if now - self._since >= 1.0:
             self._spent_s, self._since = 0.0, now
         if self._data is None or self._spent_s > BUSY_S:
@@ -63,7 +66,7 @@ class FloodReader:
                     transform = next(self._rest)
                     if transform.child.removeprefix("/") in self._children:
                         self._transforms.append(transform)
-        except (StopIteration, ValueError):  # it is read, or as much of it as can be
+        except (StopIteration, ValueError):  # the end, or an unreadable rest
             spent = time.thread_time() - begun
             self._data = None
         self._spent_s += spent

@@ -1,6 +1,6 @@
-"""Frames of the guarded tree: the parent of each, and its latest senders.
+"""Frames of the guarded tree: the parent of each frame, and its latest senders.
 
-The senders tell alternating publishers from a restarted one; the parents reveal loops.
+Senders distinguish alternating publishers from a restarted publisher. Parents reveal loops.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ if TYPE_CHECKING:
 
     from tfcompose.model.plan import Plan
 
-#: tf2's buffers keep moving edges for 10 s; one that did not come for this long closes no loop.
+#: tf2 buffers keep moving edges for 10 s. An edge that has not arrived for this time closes no
+#: loop.
 KEPT_S = 10.0
-#: The most frames without a planned parent that are remembered.
+#: Maximum number of frames without a planned parent to remember.
 MOST_FRAMES = 10_000
-#: The most senders that are remembered of one frame.
+#: Maximum number of senders of a frame to remember.
 MOST_SENDERS = 16
-#: A loop is searched this many edges up, so that a chain of thousands costs a bounded time. No
-#: robot is that deep.
+#: Maximum number of edges to follow upwards in search of a loop, so that a chain of thousands
+#: costs a bounded time. No robot is this deep.
 DEEPEST_LOOP = 100
 
 
@@ -37,14 +38,14 @@ class Frame:
 
 
 class Frames:
-    """Child frames by name: those of the plan, and others received."""
+    """Child frames by name: frames of the plan and other received frames."""
 
     def __init__(self, plan: Plan) -> None:
         self._planned = {edge.child: Frame(edge.parent, float("inf")) for edge in plan.edges}
         self._others: OrderedDict[str, Frame] = OrderedDict()
 
     def attach(self, parent: str, child: str, now: float, *, static: bool) -> bool:
-        """Note an edge that is not planned; return whether it changes the tree."""
+        """Record an edge that is not planned; return whether it changes the tree."""
         frame = self._others.get(child) or Frame("", 0.0)
         is_new = frame.parent != parent
         frame.parent, frame.last = parent, float("inf") if static else now
@@ -55,22 +56,22 @@ class Frames:
         return is_new
 
     def take_sender(self, child: str, gid: bytes) -> tuple[bytes, bool]:
-        """Note the frame's sender; return the previous one, and whether ``gid`` alternates.
+        """Record the frame's sender. Return the previous sender, and whether ``gid`` alternates.
 
-        A publisher alternates if another has sent the frame since it did.
+        A publisher alternates if another publisher has sent the frame since its own last message.
         """
         frame = self._planned.get(child) or self._others[child]
         senders = frame.senders or (gid,)
         current = senders[-1]
         if current != gid:
-            others = tuple(sender for sender in senders if sender != gid)
-            frame.senders = (*others, gid)[-MOST_SENDERS:]
+            earlier = tuple(sender for sender in senders if sender != gid)
+            frame.senders = (*earlier, gid)[-MOST_SENDERS:]
         else:
             frame.senders = senders
         return current, current != gid and gid in senders
 
     def current_sender(self, child: str) -> bytes | None:
-        """Return the last sender of a planned frame; None if there is none."""
+        """Return the last sender of a planned frame, None without a sender."""
         senders = self._planned[child].senders if child in self._planned else ()
         return senders[-1] if senders else None
 
@@ -79,7 +80,7 @@ class Frames:
         self._planned[child].senders = ()
 
     def loop(self, parent: str, child: str, now: float) -> tuple[str, ...]:
-        """Return the frames of the loop that the edge closes, from ``child`` down to it again."""
+        """Return the frames of the loop that the edge closes, from ``child`` down to ``child``."""
         left = iter(range(DEEPEST_LOOP))
         return loop_closed_by(
             (parent, child),
@@ -95,7 +96,7 @@ class Frames:
         return frame.parent if frame and now - frame.last < KEPT_S else None
 
     def memory(self) -> dict[str, tuple[str, ...]]:
-        """Return the state for the next guard: senders of planned frames, in hexadecimal."""
+        """Return the state for a new guard: senders of planned frames, in hexadecimal."""
         return {
             child: tuple(gid.hex() for gid in frame.senders)
             for child, frame in self._planned.items()

@@ -1,12 +1,13 @@
-"""Checks that the guard makes on nodes: gates that the plan waits for, and switches.
+"""The guard's checks of nodes: gates, which the plan waits for, and switches.
 
-Gates are topics, services, and the lifecycle states of nodes, which the guard may also drive.
-Without a launcher, as in exported units and containers, the guard brings nodes into their states
-by itself: again after a restart, but not after a user deactivated one.
+Gates are topics, services, and lifecycle states of nodes. The guard can also bring nodes into
+these states. Without a launcher, as in exported systemd units and containers, it does so by
+itself, and again after a node restarts, but not after a user deactivated the node.
 
-Switches are parameters that the plan wrote for nodes; the guard reads them back. It asks each node
-once after it appears, and again after it restarts. Drivers declare parameters late, once they have
-found their device, so the guard asks for a missing one again, for a while.
+Switches are parameters that the plan sets on nodes. The guard reads them back. It asks each node
+once after the node appears, and again after the node restarts. Some drivers declare parameters
+only after they have found their device. So the guard repeats requests for a missing parameter for
+a while.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.parameters import ParameterReader, Value
 
 
-#: Period between two checks of a gate, in seconds.
+#: Interval between checks of a gate, in seconds.
 CHECK_EVERY_S = 0.2
-#: And at a node that is in its state.
+#: Interval between requests to a node that is already in its state, in seconds.
 ASK_AGAIN_S = 2.0
 NAMED_AT_MOST = 6
 
@@ -61,20 +62,20 @@ class Gates:
             self._nodes[gate.process, name] = _lifecycle(self._node, name, state, drive=gate.drive)
 
     def forget(self, process: str) -> None:
-        """Stop checking the process's gate."""
+        """Stop checking the gate of the process."""
         self._gates.pop(process, None)
         self._reported.pop(process, None)
         for key in [key for key in self._nodes if key[0] == process]:
             self._nodes.pop(key).close()
 
     def check(self) -> None:
-        """Check all gates that are due; report open ones and the state of the others."""
+        """Check all gates that are due. Report open gates, and the state of the other gates."""
         now = time.monotonic()
         if not self._gates or now < self._due:
             return
         self._due = now + CHECK_EVERY_S
         for process, gate in list(self._gates.items()):
-            is_open, observed = self._at(gate, now)
+            is_open, observed = self._observe_gate(gate, now)
             if is_open:
                 self.forget(process)
                 self._emit(GateState(process, observed, is_open=True))
@@ -82,16 +83,16 @@ class Gates:
                 self._reported[process] = observed
                 self._emit(GateState(process, observed, is_open=False))
 
-    def _at(self, gate: Gate, now: float) -> tuple[bool, str]:
+    def _observe_gate(self, gate: Gate, now: float) -> tuple[bool, str]:
         states = [self._nodes[gate.process, name].check(now) for name in gate.nodes]
         if gate.topic:
-            found = writers(self._node, gate.topic)
+            publishers = writers(self._node, gate.topic)
             observed = (
-                f"{gate.topic} is published by {', '.join(writer.node for writer in found)}"
-                if found
+                f"{gate.topic} is published by {', '.join(writer.node for writer in publishers)}"
+                if publishers
                 else self._topics(gate.topic)
             )
-            states.append((bool(found), observed))
+            states.append((bool(publishers), observed))
         if gate.service:
             is_there = is_offered(self._node, gate.service)
             observed = (
@@ -105,13 +106,11 @@ class Gates:
             states.append((False, f"{topic} is published by {names or 'no node'}"))
         return all(is_open for is_open, _ in states), "; ".join(observed for _, observed in states)
 
-    def _topics(self, wanted: str) -> str:
-        return _some(
-            "topics", [name for name, _ in self._node.get_topic_names_and_types()], wanted
-        )
+    def _topics(self, name: str) -> str:
+        return _some("topics", [name for name, _ in self._node.get_topic_names_and_types()], name)
 
-    def _services(self, wanted: str) -> str:
-        return _some("services", services(self._node), wanted)
+    def _services(self, name: str) -> str:
+        return _some("services", services(self._node), name)
 
 
 @dataclass(slots=True)
@@ -123,19 +122,19 @@ class _DrivenNode:
 
 
 class LifecycleDriver:
-    """The plan's lifecycle nodes, driven without a launcher's orders."""
+    """Brings the plan's lifecycle nodes into their states without orders of a launcher."""
 
     def __init__(self, node: Node, plan: Plan) -> None:
-        wanted = {
+        states = {
             name: state for process in plan.processes for name, state in process.lifecycle.items()
         }
         self._nodes = [
             _DrivenNode(name, _lifecycle(node, name, state, drive=True))
-            for name, state in wanted.items()
+            for name, state in states.items()
         ]
 
     def check(self) -> None:
-        """Advance each due node one transition, and print changes."""
+        """Advance each due node by a transition, and print changes."""
         now = time.monotonic()
         for watched in self._nodes:
             if now < watched.due:
@@ -150,9 +149,12 @@ class LifecycleDriver:
                 watched.node.ask_again()
 
 
-def _some(what: str, names: list[str], wanted: str) -> str:
-    """Return the names in order: another namespace first, then the same, then the rest."""
-    above, _, last = wanted.rpartition("/")
+def _some(what: str, names: list[str], name: str) -> str:
+    """Return a text with the names.
+
+    First come equal names in other namespaces, then names in the same namespace, then other names.
+    """
+    above, _, last = name.rpartition("/")
     names = sorted(
         names,
         key=lambda name: (name.rpartition("/")[2] != last, name.rpartition("/")[0] != above, name),
@@ -161,15 +163,15 @@ def _some(what: str, names: list[str], wanted: str) -> str:
 
 
 def _lifecycle(node: Node, name: str, state: str, *, drive: bool) -> Lifecycle:
-    # Its messages are loaded where a node has states.
+    # Only lifecycle nodes need its message types.
     from tfcompose.tf.ros.lifecycle import Lifecycle  # noqa: PLC0415
 
     return Lifecycle(node, name, state, drive=drive)
 
 
-#: Period between two searches for nodes, in seconds.
+#: Interval between searches for nodes, in seconds.
 _CHECK_SWITCHES_EVERY_S = 0.5
-#: Time during which a parameter that the node lacks is requested again, and the period of these
+#: Time for which requests for a missing parameter are repeated, and the interval of these
 #: requests, in seconds.
 DECLARED_WITHIN_S = 20.0
 AGAIN_EVERY_S = 2.0
@@ -177,10 +179,10 @@ AGAIN_EVERY_S = 2.0
 
 @dataclass(slots=True)
 class _NodeSwitches:
-    """One node: the parameters in the plan, its sensors, and the state of the request."""
+    """A node: its parameters in the plan, its sensors, and the progress of the request."""
 
     node: str
-    wanted: dict[str, Value]
+    values: dict[str, Value]
     drives: tuple[Driven, ...]
     reader: ParameterReader
     since: float | None = None
@@ -189,7 +191,7 @@ class _NodeSwitches:
 
 
 class Switches:
-    """The nodes whose switches are read back."""
+    """The nodes whose switches the guard reads back."""
 
     def __init__(self, node: Node, plan: Plan, emit: Callable[[GuardEvent], None]) -> None:
         self._node = node
@@ -199,17 +201,20 @@ class Switches:
         self.follow(plan)
 
     def follow(self, plan: Plan) -> None:
-        """Read a plan's switches from now on; nodes with the same switches continue."""
+        """Read the switches of this plan from now on.
+
+        Nodes with the same switches keep their state.
+        """
         before = {watched.node: watched for watched in self._nodes}
         self._nodes = []
         for process in plan.processes:
-            for name, wanted in process.switches.items():
-                known = before.get(name)
-                if known and (known.wanted, known.drives) == (wanted, process.drives):
+            for name, switches in process.switches.items():
+                earlier = before.get(name)
+                if earlier and (earlier.values, earlier.drives) == (switches, process.drives):
                     self._nodes.append(before.pop(name))
                     continue
-                reader = _reader(self._node, name, tuple(wanted))
-                self._nodes.append(_NodeSwitches(name, wanted, process.drives, reader))
+                reader = _reader(self._node, name, tuple(switches))
+                self._nodes.append(_NodeSwitches(name, switches, process.drives, reader))
         for gone in before.values():
             gone.reader.close()
 
@@ -219,9 +224,9 @@ class Switches:
         return [watched.node for watched in self._nodes if watched.done]
 
     def recall(self, answered: Collection[str]) -> None:
-        """Skip these nodes until they leave: they answered the previous guard.
+        """Skip these nodes until they leave, because they answered the previous guard.
 
-        That includes nodes not discovered yet.
+        The nodes may not be discovered yet.
         """
         self._finds_until = time.monotonic() + FINDING_S
         for watched in self._nodes:
@@ -234,9 +239,9 @@ class Switches:
             return
         self._due = now + _CHECK_SWITCHES_EVERY_S
         for watched in self._nodes:
-            self._at(watched, now)
+            self._check_node(watched, now)
 
-    def _at(self, watched: _NodeSwitches, now: float) -> None:
+    def _check_node(self, watched: _NodeSwitches, now: float) -> None:
         if not watched.reader.is_there:
             watched.since, watched.done = None, watched.done and now < self._finds_until
             return
@@ -244,20 +249,20 @@ class Switches:
             return
         if watched.since is None:
             watched.since = watched.due = now
-        found = watched.reader.take()
-        if found is None:
+        samples = watched.reader.take()
+        if samples is None:
             if now >= watched.due:
                 watched.reader.ask(now)
-        elif None in found.values() and now - watched.since < DECLARED_WITHIN_S:
+        elif None in samples.values() and now - watched.since < DECLARED_WITHIN_S:
             watched.due = now + AGAIN_EVERY_S
         else:
             watched.done = True
-            for wrong in not_taken(watched.node, watched.wanted, found, watched.drives):
+            for wrong in not_taken(watched.node, watched.values, samples, watched.drives):
                 self._emit(FindingShown(wrong))
 
 
 def _reader(node: Node, name: str, parameters: tuple[str, ...]) -> ParameterReader:
-    # Its services are loaded where one is read.
+    # Only plans with switches need its service types.
     from tfcompose.tf.ros.parameters import ParameterReader  # noqa: PLC0415
 
     return ParameterReader(node, name, parameters)

@@ -1,7 +1,7 @@
-"""Watches joint states: each joint must belong to the robot and have one publisher.
+"""Watches joint states: each joint must belong to the robot and have a single publisher.
 
-A joint's edge has one publisher whoever sends the states, so TF alone does not reveal two senders.
-The topics are polled, so that their messages do not wake the guard.
+TF does not reveal two publishers of joint states, because a single node publishes the joint's
+edge. The topics are polled, so that their messages do not wake the guard.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import GuardEvent
     from tfcompose.model.plan import Plan
 
-#: Period between two reads of the topics, in seconds.
+#: Interval between reads of the topics, in seconds.
 READ_EVERY_S = 0.5
-#: A node that sends nothing for this time is no longer a sender.
+#: A node that sends nothing for this time, in nanoseconds, no longer counts as a sender.
 SENDS_NO_MORE_NS = 3_000_000_000
 
 
 class JointWatch:
-    """Judges the topics from which a plan's publishers take joint states."""
+    """Judges the topics from which the plan's publishers receive joint states."""
 
     def __init__(self, node: Node, plan: Plan, emit: Callable[[GuardEvent], None]) -> None:
         self._topics = [JointStates(node, name) for name in joint_states_topics(plan)]
         self._joints = planned_joints(plan)
         self._emit = emit
         self._due = 0.0
-        #: Reported faults that are not over, by code and message.
+        #: Reported faults that are still open, by code and message.
         self._wrong: dict[tuple[str, str], Finding] = {}
 
     def wrong(self) -> list[Finding]:
@@ -46,21 +46,21 @@ class JointWatch:
         return list(self._wrong.values())
 
     def check(self) -> None:
-        """Read messages, and report new and resolved findings when due."""
+        """Read messages when due, and report new and resolved findings."""
         if not self._topics or time.monotonic() < self._due:
             return
         self._due = time.monotonic() + READ_EVERY_S
-        found = {}
+        by_joint = {}
         for states in self._topics:
             states.take()
             states.forget(wall_ns() - SENDS_NO_MORE_NS)
             senders = states.sent_joints()
             for wrong in (*find_sent_twice(senders), *unknown_joints(senders, self._joints)):
-                found[wrong.code, wrong.message] = wrong
-        for key, wrong in found.items():
+                by_joint[wrong.code, wrong.message] = wrong
+        for key, wrong in by_joint.items():
             if key not in self._wrong:
                 self._emit(FindingShown(wrong))
         for key, wrong in self._wrong.items():
-            if key not in found:
+            if key not in by_joint:
                 self._emit(RecoveredShown(f"no longer: {wrong.message}"))
-        self._wrong = found
+        self._wrong = by_joint

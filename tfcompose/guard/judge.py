@@ -1,8 +1,8 @@
-"""The guard's judgement: who may publish which edge, and how, message by message.
+"""The guard's judgement: which node may publish which edge, message by message.
 
-A judge takes messages, the graph and the time, and returns events. It reads no clock and no topic,
-so that histories can be replayed. Times are monotonic seconds, except those of messages, which are
-nanoseconds of the system clock. Its ledger has the faults of edges.
+A judge takes messages, the ROS graph and the time, and returns events. It reads no clock and no
+topic, so that recorded histories can be replayed. Times are monotonic seconds. Only the times of
+messages are nanoseconds of the system clock. The judge's ledger holds the faults of edges.
 """
 
 from __future__ import annotations
@@ -27,48 +27,49 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
     from tfcompose.tf.live.publishers import Message, Publisher
 
-#: A guard that follows one that died misses no publisher for this long: it has to find all nodes
-#: again.
+#: After a new guard replaces a guard that died, no publisher counts as missing for this time, in
+#: seconds, because the new guard has to discover all nodes.
 FINDING_S = 5.0
-#: A tree that is not complete after this long is no longer waited for, in seconds.
+#: After this time, in seconds, the guard stops waiting for a complete tree.
 STARTING_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
 class JudgeMemory:
-    """State for the next guard, of one pair of topics.
+    """State for a new guard, for a pair of topics.
 
-    The launcher keeps it, part by part. Ids of publishers are in hexadecimal.
+    The launcher stores it in parts. Ids of publishers are in hexadecimal.
     """
 
     start: StartTime
-    #: The senders of each frame, the newest last.
+    #: Senders of each frame, the newest last.
     owners: dict[str, tuple[str, ...]]
-    #: By publisher.
+    #: State of each publisher, by its id.
     senders: dict[str, SenderMemory]
     faults: dict[str, tuple[Fault, ...]]
-    #: The reported codes and publishers.
+    #: Codes and publishers of reported findings.
     reported: tuple[tuple[str, str], ...]
     live: LivenessMemory
 
 
 def started_nodes(plan: Plan) -> dict[str, str]:
-    """Return the processes that the plan starts, by node."""
+    """Return the processes that the plan starts, by node name."""
     return {node: process.name for process in plan.managed for node in process.nodes}
 
 
 @dataclass(slots=True)
 class Judge:
-    """The state of a watch over a plan."""
+    """Judgement of a plan's edges on a pair of topics."""
 
     plan: Plan
-    #: How long it observes before the start, in seconds.
+    #: Duration of the observation before the start, in seconds.
     settle_s: float
     begun: float
     begun_ns: int
-    #: True: the ids of messages are those of the graph. False: they only distinguish senders.
-    says_who: bool = True
-    #: True: remappings isolate the plan's processes.
+    #: Whether the ids of messages are the ids of publishers in the ROS graph. If not, they only
+    #: distinguish senders.
+    gid_identifies_node: bool = True
+    #: Whether remappings isolate the plan's processes.
     remapped: bool = False
     live: Liveness = field(init=False)
     clocks: Clocks = field(init=False)
@@ -77,7 +78,7 @@ class Judge:
     _senders: Senders = field(init=False)
     _publishers: PublisherReports = field(init=False)
     _sent: SentPoses = field(init=False)
-    #: The processes that the plan starts, by their nodes.
+    #: Processes that the plan starts, by node name.
     _started: dict[str, str] = field(init=False)
     _finds_until: float = 0.0
 
@@ -85,7 +86,7 @@ class Judge:
         self.live = Liveness(self.plan)
         self.clocks = Clocks(self.plan.ros.clock == "sim")
         self._start = StartTime(self.begun, self.begun_ns)
-        self._senders = Senders(says_who=self.says_who)
+        self._senders = Senders(gid_identifies_node=self.gid_identifies_node)
         self.ledger = Ledger(self.plan, self._senders, self._start)
         self._publishers = PublisherReports(self.plan)
         self._sent = SentPoses(self.plan, self._senders)
@@ -101,9 +102,9 @@ class Judge:
         self.ledger.follow(plan)
 
     def take(self, message: Message, now: float) -> JudgedMessage:
-        """Take a message and return the verdict on it, by which it can be forwarded.
+        """Judge a message and return the verdict, which decides how to forward the message.
 
-        Pass both to ``judge_arrival`` afterwards; ``tick`` reports violations.
+        Pass both to ``judge_arrival`` afterwards. ``tick`` reports violations.
         """
         self._senders.heard(message, now)
         if message.poses:
@@ -113,7 +114,7 @@ class Judge:
     def judge_arrival(
         self, judged: JudgedMessage, message: Message, now: float
     ) -> list[GuardEvent]:
-        """Judge the arrival of a taken message; return events for the edges that it makes live."""
+        """Judge the arrival of a message. Return events for edges that the message makes live."""
         if not judged.children:
             return []
         return self.live.note_arrivals(
@@ -121,18 +122,21 @@ class Judge:
         )
 
     def admits(self, message: Message, now: float) -> frozenset[tuple[str, str]] | None:
-        """Return which edges of the message may pass in a strict plan; None: all."""
+        """Return the edges of the message that may pass in a strict plan, None for all edges."""
         judged = JudgedMessage()
         self.ledger.judge(judged, message, now)
         return judged.admitted
 
     def is_starting(self, now: float) -> bool:
-        """Return whether processes wait for its reports: until the tree is complete, or late."""
+        """Return whether processes wait for the guard's reports.
+
+        They wait until the tree is complete, but no longer than ``STARTING_S``.
+        """
         cleared = self._start.cleared
         return cleared is None or (now - cleared < STARTING_S and not self.live.is_complete)
 
     def next_tick(self, now: float, every_s: float) -> float:
-        """Return when ``tick`` is due, at the latest at the end of the observation."""
+        """Return when ``tick`` is next due, not later than the end of the observation."""
         end = self.begun + self.settle_s
         return (
             min(now + every_s, end) if self._start.cleared is None and end > now else now + every_s
@@ -140,13 +144,13 @@ class Judge:
 
     @property
     def compared(self) -> frozenset[str]:
-        """The frames whose poses it compares with the plan's."""
+        """The frames whose poses the judge compares with the plan."""
         return self._sent.frames
 
     def name_of(self, gid: bytes | None) -> str:
-        """Return the publisher's node, or all candidates; empty while unknown.
+        """Return the publisher's node, or all candidates; empty if unknown.
 
-        A publisher with the name of a process's node, but of another process, is "another" one.
+        The word "another" precedes the name if a different process uses the node name of the plan.
         """
         nodes = self._senders.nodes(gid, static=False) if gid is not None else ()
         process, is_ours = self._senders.process(gid), self._senders.is_ours(gid)
@@ -155,11 +159,12 @@ class Judge:
         return f"another {nodes[0]}" + (f" of {process}" if process else "")
 
     def graph(self, publishers: Sequence[Publisher], now: float) -> list[GuardEvent]:
-        """Take the current publishers on /tf and /tf_static; return the events that follow."""
+        """Process the current publishers on /tf and /tf_static; return the resulting events."""
         self._senders.update(publishers)
         events = [*self._recheck(now), *self._publishers.wrong_settings(publishers)]
         for report in self._publishers.leaving_the_fence(publishers, self._senders, now):
-            # Report its messages first: it may be stopped before their own report is due.
+            # Report faults of its messages first, because it may be stopped before their report is
+            # due.
             events += self.ledger.report(now, at_once=report.gid)
             events += self._publishers.report_unfenced(report, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
@@ -173,22 +178,22 @@ class Judge:
         return events
 
     def clock(self, sim_ns: int | None, now: float) -> None:
-        """Take the newest time on /clock. After it jumps back, stamps may go back too."""
+        """Process the newest time on /clock. After it jumps back, stamps may go back, too."""
         before = self.clocks.sim_ns
         self.clocks.take(sim_ns, now)
         if before is not None and sim_ns is not None and sim_ns < before:
             self.ledger.forget_stamps()
 
     def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[GuardEvent]:
-        """Take the publishers on the global topics while the plan's own are ``topics``."""
+        """Process the publishers on the global topics if the plan uses the separate ``topics``."""
         return list(self._publishers.leaks(publishers, topics))
 
     def is_flooded_by(self, gid: bytes | None) -> bool:
-        """Return whether the publisher has published more undeclared edges than are judged."""
+        """Return whether the publisher exceeds the limit of undeclared edges."""
         return gid in self.ledger.flooders
 
     def report_flood(self, gid: bytes | None, transforms: int, now: float) -> None:
-        """Take a message from a publisher with more undeclared edges than are judged."""
+        """Count a message from a publisher that exceeds the limit of undeclared edges."""
         self.ledger.count_flood(gid, transforms, now)
 
     def tick(self, now: float) -> list[GuardEvent]:
@@ -213,15 +218,15 @@ class Judge:
         return events
 
     def health(self, now: float) -> list[EdgeHealth]:
-        """Return the state of each planned edge, in the plan's order."""
-        found = {}
+        """Return the state of each planned edge, in the order of the plan."""
+        statuses = {}
         for track in self.live.tracks:
             age_s, rate = self.live.seconds_since(track, now) if track.live else (None, None)
             for edge in track.edges:
                 sender = self.ledger.frames.current_sender(edge.child)
                 names = self._senders.nodes(sender, static=edge.kind == "static")
                 publisher = names[0] if len(names) == 1 else edge.node
-                found[edge.child] = EdgeHealth(
+                statuses[edge.child] = EdgeHealth(
                     edge,
                     publisher if track.live else "",
                     rate,
@@ -230,32 +235,35 @@ class Judge:
                     silent=track.silent,
                     slow=track.slow,
                 )
-        return [found[edge.child] for edge in self.plan.edges]
+        return [statuses[edge.child] for edge in self.plan.edges]
 
     def wrong(self) -> list[Finding]:
-        """Return the open findings, worst first.
+        """Return the open findings, the worst first.
 
-        Silence and low rates are not among them: ``health`` and ``live`` have those.
+        ``health`` and ``live`` report silent and slow edges, which are not included here.
         """
         return self.ledger.wrong()
 
     def absent(self, owner: str) -> None:
-        """Treat the owner as stopped on purpose: the next publisher of its edges replaces it."""
+        """Treat the owner as stopped on purpose.
+
+        The next publisher of its edges may replace it.
+        """
         edges = self.plan.edges_of(owner)
         if edges:
             self.live.absent(owner)
         self.ledger.forget_owners(edges)
 
-    # State for the next guard.
+    # State for a new guard.
 
     @property
     def mark(self) -> tuple[int, ...]:
-        """A value that changes whenever the state for the next guard does."""
+        """A value that changes whenever the state for a new guard changes."""
         changes = (self.ledger.epoch, self.live.changes, self._publishers.changes)
         return (*changes, *self._senders.mark)
 
     def memory(self) -> JudgeMemory:
-        """Return the state for the next guard."""
+        """Return the state for a new guard."""
         return JudgeMemory(
             self._start,
             self.ledger.frames.memory(),
@@ -266,7 +274,7 @@ class Judge:
         )
 
     def recall(self, memory: JudgeMemory, now: float) -> list[GuardEvent]:
-        """Restore the previous guard's state; return that the initial observation is over."""
+        """Restore the previous guard's state; return the event that the observation is over."""
         self._finds_until = now + FINDING_S
         begun = memory.start
         self._start.begun, self._start.begun_ns = begun.begun, begun.begun_ns
@@ -281,7 +289,7 @@ class Judge:
     # Observations.
 
     def _recheck(self, now: float) -> list[GuardEvent]:
-        """Judge messages that waited for a node name."""
+        """Judge messages that waited for a node's name."""
         return [
             event
             for children in self.ledger.recheck(now)
@@ -291,11 +299,12 @@ class Judge:
     def _judge_stamps(self, judged: JudgedMessage, message: Message, now: float) -> float | None:
         """Judge the stamps of an owner's message.
 
-        Return the age of the first in seconds, if known.
+        Return the age of the first stamp in seconds, None if unknown.
         """
         if message.static or not message.stamps_ns:
             return None
-        # A message that waited for the guard says nothing of its sender's clock.
+        # The delay of a message that waited for the guard does not show that its sender's clock is
+        # wrong.
         clocks = Clocks(simulated=True) if self.live.is_behind(now) else self.clocks
         code, detail = judged.stamps.judge(message.stamps_ns, message.received_ns, clocks)
         if code:

@@ -1,13 +1,13 @@
 """Ledger of edges: their publishers, faults and reports.
 
-A message is judged once. The verdict holds for the publisher's next messages with the same edges
-until the ledger's ``epoch`` changes: with the senders of a frame, the shape of the tree, the
-start, or the end of a fault. A message from a publisher without a known node name waits for the
-name, for a while.
+A message is judged once. The verdict is valid for the publisher's next messages with the same
+edges until the ledger's ``epoch`` changes. It changes with the senders of a frame, the shape of
+the tree, the start of the plan, or the end of a fault. A message from a publisher whose node name
+is unknown waits for the name for a while.
 
-A fault belongs to a publisher. Faults with one code and one node name are reported together, in
-one finding that names each process. They are reported again when some end and others go on, and
-they are over with the last of them.
+A fault belongs to a publisher. Faults with the same code and node name are reported in a single
+finding that names each process. If some of these faults end, the remaining faults are reported
+again. When the last of them ends, their end is reported.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tfcompose.guard.verdict.drivers import drives_of
 from tfcompose.guard.verdict.faults import Fault, fault_finding, group_of
 from tfcompose.guard.verdict.ownership import code_of
 from tfcompose.guard.verdict.stamps import StampHistory
-from tfcompose.model.messages import FindingShown, RecoveredShown, Taken
+from tfcompose.model.messages import EdgeTaken, FindingShown, RecoveredShown
 from tfcompose.tf.live.publishers import NAMELESS_S, PARTICIPANT
 
 if TYPE_CHECKING:
@@ -36,41 +36,41 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan, PlanEdge
     from tfcompose.tf.live.publishers import Message, Senders
 
-#: Time that a possible owner may stay without a name before it is judged.
+#: Time in seconds after which a possible owner without a name is judged.
 NAMELESS_OWNER_S = 5.0
-#: The most kinds of messages whose verdicts are kept, and the most edges of these together.
+#: Maximum number of different messages whose verdicts are kept, and of their edges in total.
 MOST_VERDICTS = 4096
 MOST_VERDICT_EDGES = 200_000
-#: Validity of the verdict on a message with undeclared edges.
+#: Validity of the verdict on a message with undeclared edges, in seconds.
 UNDECLARED_S = 1.0
-#: The most undeclared edges of one publisher that are judged; further ones are neither reported
+#: Maximum number of undeclared edges of a publisher to judge. Further edges are neither reported
 #: nor admitted.
 MOST_UNDECLARED = 1000
-#: A fault is over when its publisher has left and nothing came for this long, or for longer from
-#: one that stays.
+#: A fault ends when its publisher has left and no message came for this time, in seconds. If the
+#: publisher stays, the time is longer.
 OVER_S = 3.0
 OVER_WHILE_PRESENT_S = 30.0
-#: Time a strict guard waits to learn whether listeners receive a message.
+#: Time in seconds for which a strict guard waits to find out whether listeners receive a message.
 FATE_S = 0.3
-#: All that another robot publishes is one finding.
+#: Code of the single finding about all edges that another robot publishes.
 OTHER_ROBOT = "TF854"
 
-#: Faults before the start that keep the plan from starting.
+#: Faults that prevent the start of the plan if they are observed before it.
 _TAKES = frozenset({faults.NOT_OWNER, faults.WRONG_PARENT, faults.LOOP})
-#: Faults that break the tree: ``stop-offender`` stops the process.
+#: Faults that break the tree. With ``stop-offender``, the guard has the process stopped.
 _STOPPED_FOR = _TAKES | {faults.UNDECLARED}
-#: Note on a message in a strict plan, by whether its sender is behind the fence.
+#: Note about a message in a strict plan, by whether its sender is isolated.
 _FATE = {
     True: "held back: no listener receives it",
     False: "not fenced off, so it cannot be held back: listeners receive it",
     None: "whether it is fenced off is unknown; if it is, it is held back",
 }
-#: tfcompose's own publishers, which a plan starts once and never again.
+#: tfcompose's publishers, which the launcher starts only once in a run.
 _BUILT_IN = ("static", "joints")
 
-#: Code, parent, child and publisher's id.
+#: Code, parent, child, and the publisher's id.
 Key = tuple[str, str, str, bytes]
-#: Code, node, and the plan's process that it is proven to belong to.
+#: Code, node, and the plan's process that the publisher is proven to belong to.
 Group = tuple[str, str, str]
 #: An edge's parent and child.
 Ends = tuple[str, str]
@@ -87,15 +87,15 @@ class SentEdge(NamedTuple):
 
 @dataclass(slots=True)
 class OpenFault:
-    """A fault of a publisher that is not over."""
+    """A fault of a publisher that has not ended."""
 
     fault: Fault
     gid: bytes | None
-    #: When it was first and last observed, in monotonic seconds.
+    #: Times of the first and last observation, in monotonic seconds.
     since: float
     last: float
     reported: bool = False
-    #: The publishers named in the report; several may alternate.
+    #: Publishers that the report names; several publishers may alternate.
     named: frozenset[bytes | None] = frozenset()
 
 
@@ -105,24 +105,27 @@ class JudgedMessage:
 
     stamps: StampHistory = field(default_factory=StampHistory)
     epoch: int = -1
-    #: How long the verdict holds at most, in monotonic seconds.
+    #: End of the verdict's validity, in monotonic seconds.
     until: float = 0.0
     entries: tuple[OpenFault, ...] = ()
-    #: The planned edges in the message, by child.
+    #: Child frames of the planned edges in the message.
     children: tuple[str, ...] = ()
-    #: The edges that may pass; None: all.
+    #: Edges that may pass, None for all edges.
     admitted: frozenset[Ends] | None = None
 
 
 class Ledger:
-    """Received edges by publisher, under a plan; ``epoch`` changes with all that it knows."""
+    """Received edges by publisher, compared with a plan.
+
+    ``epoch`` changes whenever the ledger's knowledge changes.
+    """
 
     def __init__(self, plan: Plan, senders: Senders, start: StartTime) -> None:
         self.epoch = 0
         self.planned: dict[str, PlanEdge] = {edge.child: edge for edge in plan.edges}
         self.frames = Frames(plan)
         self.entries: dict[Key, OpenFault] = {}
-        #: Publishers of more undeclared edges than are judged.
+        #: Publishers with more undeclared edges than the judge accepts.
         self.flooders: dict[bytes | None, Flood] = {}
         self._plan = plan
         self._senders = senders
@@ -132,7 +135,8 @@ class Ledger:
         self._waiting: dict[SentEdge, float] = {}
         self._pace: Pace[tuple[Group, bool]] = Pace()
         self._ended: dict[Group, list[tuple[Fault, bool]]] = {}
-        #: Locations of ended publishers, by edges that others of the group still publish.
+        #: Locations of publishers that ended, by edges that other publishers of the group still
+        #: send.
         self._left: dict[Group, dict[Ends, list[str]]] = {}
         self._know_processes(plan)
 
@@ -150,13 +154,13 @@ class Ledger:
         self.planned = {edge.child: edge for edge in plan.edges}
         for entry in self.entries.values():
             entry.fault = self._replan_fault(entry.fault)
-        self.epoch += 1  # verdicts that are remembered hold edges
+        self.epoch += 1  # cached verdicts contain edges of the old plan
 
     # Messages.
 
     @property
     def is_settled(self) -> bool:
-        """Whether no message waits for its sender's name, and no fault for its report."""
+        """Whether no message waits for its sender's name and no fault waits for its report."""
         return not self._waiting and all(entry.reported for entry in self.entries.values())
 
     def take(self, message: Message, now: float) -> JudgedMessage:
@@ -176,7 +180,7 @@ class Ledger:
         return judged
 
     def judge(self, judged: JudgedMessage, message: Message, now: float) -> None:
-        """Judge the edges of a message; the verdict is kept if it is certain."""
+        """Judge the edges of a message. A certain verdict is cached."""
         nodes = self._senders.nodes(message.gid, static=message.static)
         sure = self._senders.is_sure(message.gid)
         epoch, certain = self.epoch, sure
@@ -190,7 +194,8 @@ class Ledger:
                     continue
             sent = SentEdge(message.gid, parent, child, message.static)
             fault = self._fault(sent, nodes, now) if nodes else None
-            # If ids do not identify nodes, the sender may be one that the graph does not show yet.
+            # If ids do not identify nodes, the sender may be a node that the graph does not show
+            # yet.
             if not nodes or (fault and not sure and not fault.namesake):
                 self._waiting.setdefault(sent, now)
                 certain = False
@@ -204,15 +209,15 @@ class Ledger:
                 children.append(child)
         judged.admitted = None if {*admitted} == {*message.edges} else frozenset(admitted)
         judged.entries, judged.children = tuple(entries), tuple(children)
-        if left < 0 and message.gid not in self.flooders:  # its messages count from now on
+        if left < 0 and message.gid not in self.flooders:  # count its messages from now on
             self.count_flood(message.gid, len(message.edges), now)
-        # The edges of a flood change the state, but do not cause another judgement.
+        # The edges of a flood change the state, but need no new judgement.
         epoch = self.epoch if left < 0 else epoch
         judged.epoch = epoch if certain and epoch == self.epoch else -1
         judged.until = now + UNDECLARED_S if unplanned else float("inf")
 
     def recheck(self, now: float) -> list[tuple[str, ...]]:
-        """Judge messages that waited for a name; return their planned edges, by sender."""
+        """Judge messages that waited for a name. Return their planned edges, by sender."""
         arrived: dict[bytes | None, list[str]] = {}
         for sent, since in list(self._waiting.items()):
             nodes = self._senders.nodes(sent.gid, static=sent.static)
@@ -228,45 +233,51 @@ class Ledger:
         return [tuple(children) for children in arrived.values()]
 
     def note(self, fault: Fault, gid: bytes | None, now: float) -> OpenFault:
-        """Note that the fault is observed now."""
+        """Record that the fault is observed now."""
         entry = self.entries.setdefault(self._key(fault, gid), OpenFault(fault, gid, now, now))
         entry.gid, entry.last = gid, now
-        if fault.nodes and not entry.fault.nodes:  # the publisher has got its name
+        if fault.nodes and not entry.fault.nodes:  # the publisher's name is now known
             entry.fault, entry.reported = fault, False
         return entry
 
     def count_flood(self, gid: bytes | None, transforms: int, now: float) -> None:
-        """Count a message from a publisher of more undeclared edges than are judged."""
+        """Count a message from a publisher with more undeclared edges than the judge accepts."""
         self.flooders.setdefault(gid, Flood(now)).count(transforms, now)
 
     def clear(self, now: float) -> None:
-        """Note that the observation before the start is over."""
+        """Record that the observation before the start is over."""
         self._start.clear(now)
         self.epoch += 1
 
     def forget_owners(self, edges: Iterable[PlanEdge]) -> None:
-        """Treat the next sender of these edges as the first: their owner was stopped."""
+        """Treat the next sender of these edges as the first, because their owner was stopped."""
         for edge in edges:
             self.frames.forget_senders(edge.child)
         self.epoch += 1
 
     def forget_stamps(self) -> None:
-        """Treat the next stamps as the first ones: the clock has gone back."""
+        """Treat the next stamps as the first, because the clock has gone back."""
         for judged in self._judged.values():
             judged.stamps = StampHistory()
 
     def _key(self, fault: Fault, gid: bytes | None) -> Key:
-        """Return the key of the fault: its publisher, if there is only one candidate."""
+        """Return the key of the fault.
+
+        It contains the publisher if there is only one candidate.
+        """
         is_sure = gid is not None and self._senders.is_sure(gid) and not fault.alternates
         return (fault.code, fault.parent, fault.child, (is_sure and gid) or b"")
 
     def _count_undeclared(self, gid: bytes | None) -> int:
-        """Return how many undeclared edges of the publisher are faults, or wait for its name."""
-        known = sum(e.gid == gid and e.fault.edge is None for e in self.entries.values())
-        return known + sum(sent.gid == gid for sent in self._waiting)
+        """Return the number of undeclared edges of the publisher.
+
+        Edges count that are faults, and edges that wait for the publisher's name.
+        """
+        count = sum(e.gid == gid and e.fault.edge is None for e in self.entries.values())
+        return count + sum(sent.gid == gid for sent in self._waiting)
 
     def _patience_s(self, sent: SentEdge, nodes: tuple[str, ...]) -> float:
-        """Return the time to wait for the sender's name; longer if it may be the owner."""
+        """Return the time to wait for the sender's name, longer for a possible owner."""
         edge = self.planned.get(sent.child)
         if nodes or edge is None or not edge.may_hang_on(sent.parent):
             return NAMELESS_S
@@ -276,7 +287,10 @@ class Ledger:
         return NAMELESS_S if is_known or is_early else NAMELESS_OWNER_S
 
     def _has_arrived(self, sent: SentEdge, fault: Fault | None) -> bool:
-        """Return whether the owner's edge has come; any alternating publisher may be the owner."""
+        """Return whether the owner's edge has arrived.
+
+        If publishers alternate, any of them may be the owner.
+        """
         if sent.child not in self.planned or fault is None:
             return sent.child in self.planned
         return fault.namesake and self.frames.current_sender(sent.child) is not None
@@ -323,16 +337,17 @@ class Ledger:
         if not alternates or not self._senders.is_present(current):
             return None
         named = self._senders.nodes(current, static=static)
-        other = named[0] if len(named) == 1 else "another"
-        return replace(fault, code=faults.TWO_PUBLISHERS, detail=other)
+        detail = named[0] if len(named) == 1 else "another"
+        return replace(fault, code=faults.TWO_PUBLISHERS, detail=detail)
 
     def _is_namesake(self, edge: PlanEdge, sent: SentEdge) -> bool:
-        """Return whether a publisher has the owner's name and certainly is not the owner.
+        """Return whether a publisher has the owner's node name but certainly is not the owner.
 
         A process of this run proves its identity by its environment. If the plan starts the owner,
-        no other process of the run is the owner, and while the owner is present, no process from
-        elsewhere is. Without proof, a publisher is another one if it sent before the start, or if
-        tfcompose's own publisher, which never restarts, is already present.
+        no other process of the run can be the owner. While the owner is present, no process from
+        elsewhere can be the owner. Without proof, a publisher is not the owner in two cases: it
+        sent before the start, or the owner is one of tfcompose's publishers, which never restart,
+        and is already present.
         """
         gid, sender, start = sent.gid, self._senders.sender(sent.gid), self._start
         if sender is None or not self._starts.get(edge.owner, False):
@@ -350,10 +365,10 @@ class Ledger:
         return self._senders.is_present(current) and not is_proven
 
     def _is_alternating(self, edge: PlanEdge, sent: SentEdge) -> bool:
-        """Return whether several publishers with the owner's name send the edge in turns: A, B, A.
+        """Return whether publishers with the owner's name send the edge alternately: A, B, A.
 
-        Any of them may be the owner, unless one has proven that it is. Fixed edges do not count:
-        they arrive again with every new subscription.
+        Each of them may be the owner, unless one of them has proven it. Fixed edges do not count,
+        because they arrive again with every new subscription.
         """
         gid = sent.gid
         if gid is None or self._senders.sender(gid) is None:
@@ -368,10 +383,10 @@ class Ledger:
     # Findings.
 
     def report(self, now: float, *, at_once: bytes | None = None) -> list[GuardEvent]:
-        """Report new faults, those of one group in one finding.
+        """Report new faults. The faults of a group are reported in a single finding.
 
-        ``at_once`` is a publisher: report all its faults now, even if more may become known about
-        them.
+        ``at_once`` is a publisher whose faults are all reported now, even if more information
+        about them may follow.
         """
         grouped: dict[Group, list[OpenFault]] = {}
         for entry in self.entries.values():
@@ -392,9 +407,9 @@ class Ledger:
         return events
 
     def over(self, now: float) -> list[GuardEvent]:
-        """Drop ended faults, and report their end; the next of their kind is new.
+        """Remove ended faults and report their end. A later fault of the same kind is new.
 
-        An edge is not over while others of the same name send it: these are reported again.
+        While other publishers with the same name send the edge, it is reported again instead.
         """
         ended = [
             key
@@ -417,7 +432,7 @@ class Ledger:
         return [*map(RecoveredShown, texts), *self._report_remaining(now)]
 
     def wrong(self) -> list[Finding]:
-        """Return the open faults by edge and name, worst first."""
+        """Return the open faults by edge and name, the worst first."""
         findings = []
         for edges in self._by_group().values():
             for entries in edges.values():
@@ -428,7 +443,7 @@ class Ledger:
         return sorted(findings, key=lambda finding: (finding.severity, finding.code))
 
     def memory(self) -> dict[str, tuple[Fault, ...]]:
-        """Return the open faults that were reported, by publisher id in hexadecimal."""
+        """Return the open reported faults, by publisher id in hexadecimal."""
         reported: dict[str, tuple[Fault, ...]] = {}
         for entry in self.entries.values():
             if entry.reported:
@@ -437,25 +452,28 @@ class Ledger:
         return reported
 
     def recall(self, memory: Mapping[str, Sequence[Fault]], until: float) -> None:
-        """Restore faults reported by the previous guard; they last at least ``until`` then."""
-        for hexed, known in memory.items():
+        """Restore faults that the previous guard reported.
+
+        They stay open at least ``until`` then.
+        """
+        for hexed, entries in memory.items():
             gid = bytes.fromhex(hexed) or None
-            for fault in known:
+            for fault in entries:
                 entry = OpenFault(self._replan_fault(fault), gid, until, until, reported=True)
                 self.entries[self._key(fault, gid)] = entry
 
     def _replan_fault(self, fault: Fault) -> Fault:
-        """Return a fault found under another plan, with this plan's edge."""
+        """Return a fault that was found under another plan, with the edge of this plan."""
         return replace(fault, edge=self.planned.get(fault.child)) if fault.edge else fault
 
     def _group(self, entry: OpenFault) -> Group:
-        """Return a fault's group in reports: its code and node, or the node's robot."""
+        """Return the group of a fault in reports: code and node name, or the node's robot."""
         if run := self._senders.run(entry.gid):
             return (OTHER_ROBOT, run.name, "")
         return (entry.fault.code, entry.fault.who, self._senders.process(entry.gid))
 
     def _by_group(self) -> dict[Group, dict[Ends, list[OpenFault]]]:
-        """Return the faults by their group, and then by their edge."""
+        """Return the faults by group and then by edge."""
         by_group: dict[Group, dict[Ends, list[OpenFault]]] = {}
         for entry in self.entries.values():
             edges = by_group.setdefault(self._group(entry), {})
@@ -463,10 +481,10 @@ class Ledger:
         return by_group
 
     def _is_ripe(self, entry: OpenFault, now: float) -> bool:
-        """Return whether all that can be known about a fault is known.
+        """Return whether no further information about the fault is expected.
 
         If ids do not identify nodes, a publisher that alternates with the owner may not be in the
-        graph yet. All candidates in the graph a while later are named.
+        graph yet. In that case the report waits, and then names all candidates in the graph.
         """
         fault, gid = entry.fault, entry.gid
         sender = self._senders.sender(gid)
@@ -487,27 +505,30 @@ class Ledger:
         entries: Sequence[OpenFault],
         edges: Mapping[Ends, Sequence[OpenFault]],
         now: float,
-    ) -> FindingShown | Taken:
-        """Return the event for faults of one group, whose ``edges`` these and others send."""
+    ) -> FindingShown | EdgeTaken:
+        """Return the event for faults of a group.
+
+        ``edges`` are all its edges with their faults.
+        """
         gid = entries[0].gid
         run, process = self._senders.run(gid), self._senders.process(gid)
         ends = dict.fromkeys(entry.fault.ends for entry in entries)
         publishers = self._publishers([entry for edge in ends for entry in edges[edge]])
         runs = self._runs_of(publishers)
         is_stranger = any(runs) and not process
-        known = [replace(entry.fault, stranger=is_stranger) for entry in entries]
+        recorded = [replace(entry.fault, stranger=is_stranger) for entry in entries]
         for entry in entries:
             entry.named = frozenset(self._gids_of(entry))
         group = group_of(
-            known, self._plan, runs, faults.sensor_of(known[0], self._drives), process
+            recorded, self._plan, runs, faults.sensor_of(recorded[0], self._drives), process
         )
         was_first = any(self._was_first(entry, now) for entry in entries)
         if run:
-            finding = faults.other_robot_finding(known, run, self._plan)
-            return Taken(finding) if was_first else FindingShown(finding)
+            finding = faults.other_robot_finding(recorded, run, self._plan)
+            return EdgeTaken(finding) if was_first else FindingShown(finding)
         if was_first:
-            return Taken(faults.taken_finding(group))
-        finding, first = fault_finding(group), known[0]
+            return EdgeTaken(faults.taken_finding(group))
+        finding, first = fault_finding(group), recorded[0]
         notes = []
         if self._says_fate(first):
             fates = dict.fromkeys(map(self._senders.is_held_back, publishers))
@@ -518,7 +539,7 @@ class Ledger:
         return FindingShown(replace(finding, notes=(*finding.notes, *notes)), offender)
 
     def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
-        """Repeat the reports of edges whose publishers have changed."""
+        """Repeat reports of edges whose publishers have changed."""
         due = [group for group in self._left if self._is_due((group, False), now)]
         by_group = self._by_group() if due else {}
         for group in due:
@@ -538,18 +559,19 @@ class Ledger:
         return faults.over_texts(self._ended.pop(group), robot)
 
     def _compare(self, entry: OpenFault, edges: Mapping[Ends, Sequence[OpenFault]]) -> None:
-        """Note that a fault is over, or that its publishers have changed.
+        """Record that a fault has ended, or that its publishers have changed.
 
-        The entry has ended, or belongs to alternating publishers; ``edges`` are its group's.
+        The entry has ended or belongs to alternating publishers. ``edges`` are the edges of its
+        group.
         """
         group, fault = self._group(entry), entry.fault
-        others = [other for other in edges.get(fault.ends, ()) if other.reported]
-        if not others:
+        reported = [open_fault for open_fault in edges.get(fault.ends, ()) if open_fault.reported]
+        if not reported:
             is_latched = fault.static and not fault.is_of_stamps
             kept = is_latched and not self._senders.was_held_back(entry.gid)
             self._ended.setdefault(group, []).append((fault, kept))
             return
-        sending = {self._process_of(gid) for gid in self._publishers(others)}
+        sending = {self._process_of(gid) for gid in self._publishers(reported)}
         named = {self._process_of(gid): gid for gid in entry.named or self._gids_of(entry)}
         entry.named = frozenset(self._gids_of(entry))
         ended = [gid for process, gid in named.items() if process not in sending]
@@ -571,40 +593,40 @@ class Ledger:
     # Publishers.
 
     def _publishers(self, entries: Sequence[OpenFault]) -> list[bytes | None]:
-        """Return the present publishers of these entries: one id for each process.
+        """Return the present publishers of these entries, with a single id for each process.
 
-        A process may have a publisher on each topic. If its pid is unknown, only publishers of one
-        edge on one topic are certain to be different processes.
+        A process may have a publisher on each topic. If the pids are unknown, only publishers of
+        the same edge on the same topic are certain to be different processes.
         """
         sent = [(gid, entry.fault) for entry in entries for gid in self._gids_of(entry)]
         if not all(self._senders.is_sure(gid) for gid, _ in sent):
             return [entries[0].gid]
         present = [(gid, fault) for gid, fault in sent if self._senders.is_present(gid)]
         located: dict[str, bytes | None] = {}
-        others: dict[tuple[Ends, bool], dict[str | bytes, bytes | None]] = {}
+        by_edge: dict[tuple[Ends, bool], dict[str | bytes, bytes | None]] = {}
         for gid, fault in present or sent:
             if where := self._senders.where(gid):
                 located[where] = gid
             else:
-                processes = others.setdefault((fault.ends, fault.static), {})
+                processes = by_edge.setdefault((fault.ends, fault.static), {})
                 processes[self._process_of(gid)] = gid
-        most = max(others.values(), key=len, default={})
+        most = max(by_edge.values(), key=len, default={})
         return [*located.values(), *most.values()]
 
     def _runs_of(self, publishers: Sequence[bytes | None]) -> list[str]:
         return [self._senders.where(gid) for gid in publishers]
 
     def _gids_of(self, entry: OpenFault) -> list[bytes | None]:
-        """Return the publishers of a fault: one, or all that alternate."""
+        """Return the publisher of a fault, or all alternating publishers."""
         fault = entry.fault
         if not fault.alternates or not self._senders.is_sure(entry.gid):
             return [entry.gid]
         return [*self._senders.publishers_of(fault.nodes, static=fault.static)] or [entry.gid]
 
     def _process_of(self, gid: bytes | None) -> str | bytes:
-        """Return the identity of the publisher's process."""
-        known = self._senders.where(gid) or self._senders.process(gid)
-        return known or (gid or b"")[:PARTICIPANT]
+        """Return a value that identifies the publisher's process."""
+        sender = self._senders.where(gid) or self._senders.process(gid)
+        return sender or (gid or b"")[:PARTICIPANT]
 
     def _is_known_robot(
         self,
@@ -612,13 +634,13 @@ class Ledger:
         entries: Sequence[OpenFault],
         now: float,
     ) -> bool:
-        """Return whether the robot of these ``edges`` was reported for a fault as severe."""
+        """Return whether a fault that is at least as severe was reported for the other robot."""
         is_severe = any(entry.fault.edge or self._was_first(entry, now) for entry in entries)
-        known = [entry for sent in edges.values() for entry in sent if entry.reported]
-        return any(not is_severe or entry.fault.edge for entry in known)
+        recorded = [entry for sent in edges.values() for entry in sent if entry.reported]
+        return any(not is_severe or entry.fault.edge for entry in recorded)
 
     def _may_be_ours(self, fault: Fault) -> bool:
-        """Return whether the policy stops a process of this run for the fault, if proven."""
+        """Return whether the policy stops a process of this run that has the fault."""
         stops = self._plan.guard.on_violation == "stop-offender" and fault.code in _STOPPED_FOR
         return stops and not self._nodes.isdisjoint(fault.nodes)
 
@@ -626,11 +648,11 @@ class Ledger:
         return self._plan.guard.mode == "strict" and not fault.is_of_stamps
 
     def _may_learn_fate(self, entry: OpenFault, now: float) -> bool:
-        """Return whether it will soon be known if listeners receive the message."""
+        """Return whether the guard will soon know if listeners receive the message."""
         is_open = self._says_fate(entry.fault) and self._senders.is_held_back(entry.gid) is None
         return is_open and now - entry.since < FATE_S
 
     def _was_first(self, entry: OpenFault, now: float) -> bool:
-        """Return whether the publisher had the edge before the plan was started."""
+        """Return whether the publisher sent the edge before the plan was started."""
         sender = self._senders.sender(entry.gid)
         return entry.fault.code in _TAKES and self._start.was_first(sender, now)

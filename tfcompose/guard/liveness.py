@@ -1,11 +1,11 @@
 """Liveness of owners: arrivals of their edges, judged at given times.
 
-Edges that have always arrived together share one history. At first these are the edges of one
-owner. A message with only some of them splits the history, so the cost of a message does not
+Edges that have always arrived together share a history. At first these are all edges of an owner.
+A message with only some of them splits the history. Therefore the cost of a message does not
 depend on the number of its edges.
 
-Times are monotonic seconds. Silence counts only time in which the guard ran: a guard that was
-suspended or starved knows nothing of that time, and blames no owner for it.
+Times are monotonic seconds. Silence is measured only while the guard runs. A guard that was
+suspended or got no CPU time knows nothing about that time, and blames no owner for it.
 """
 
 from __future__ import annotations
@@ -33,44 +33,46 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import Plan, PlanEdge
 
-#: A rate is judged over this time or this many periods, and at least half of it. Arrivals are
-#: counted in intervals of this fraction of it, and the last two intervals count.
+#: A rate is judged over this time in seconds or this number of periods, or at least half of that.
+#: Arrivals are counted in intervals that are this fraction of the window. The last two intervals
+#: count.
 WINDOW_S = 2.0
 WINDOW_PERIODS = 8.0
 STRETCH = 0.6
-#: Maximum number of edge combinations whose tracks are remembered.
+#: Maximum number of combinations of edges whose tracks are cached.
 MOST_MESSAGES = 1000
-#: Maximum number of edges in one event, so that its line is shorter than a pipe's reader accepts.
+#: Maximum number of edges in an event, so that the event's line does not exceed the reader's
+#: limit.
 MOST_NAMED = 1000
-#: Maximum time that one tick counts; the guard ticks ten times a second.
+#: Maximum time in seconds that a tick counts. The guard ticks ten times a second.
 MAX_TICK_S = 0.25
-#: After this time without a tick, messages are lost. Lost messages arrive with the writer's next
-#: heartbeat: 3 s in Fast DDS.
+#: After this time in seconds without a tick, messages are lost. They arrive again with the
+#: writer's next heartbeat, which comes after 3 s in Fast DDS.
 STALLED_S = 1.0
 CATCH_UP_S = 3.5
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeHealth:
-    """State of one planned edge."""
+    """The state of a planned edge."""
 
     edge: PlanEdge
-    #: The full name of the publishing node; empty: none.
+    #: Full name of the publishing node; empty without one.
     publisher: str = ""
-    #: In hertz; None: unknown.
+    #: Rate in Hz, None if unknown.
     rate: float | None = None
-    #: Time since the last arrival, in seconds; None: unknown.
+    #: Time since the last arrival in seconds, None if unknown.
     age_s: float | None = None
-    #: Age of the last stamp at its arrival, in seconds; None: unknown.
+    #: Age of the last stamp at its arrival in seconds, None if unknown.
     delay_s: float | None = None
-    #: True: it should have come again by now, at the plan's rate.
+    #: Whether it is overdue at the plan's rate.
     silent: bool = False
-    #: True: its rate is below the plan's.
+    #: Whether its rate is below the plan's rate.
     slow: bool = False
 
     @property
     def text(self) -> str:
-        """The state in words."""
+        """The state as text."""
         if self.age_s is None:
             return "not seen yet"
         numbers = [f"age {self.age_s:.3f} s"] if self.edge.kind != "static" else ["latched"]
@@ -81,7 +83,7 @@ class EdgeHealth:
 
 @dataclass(slots=True)
 class WatchedTime:
-    """The seconds in which the guard ran: a clock that stops while the guard does."""
+    """The time in which the guard ran: a clock that stops while the guard does not run."""
 
     _seconds: float = 0.0
     _ticked: float | None = None
@@ -94,19 +96,19 @@ class WatchedTime:
         return self._seconds + min(max(now - self._ticked, 0.0), MAX_TICK_S)
 
     def begins_late(self, until: float) -> None:
-        """Treat owners missing until that time as not discovered yet."""
+        """Treat owners that are missing until this time as not discovered yet."""
         self._catching_up_until = max(self._catching_up_until, until)
 
     def is_behind(self, now: float) -> bool:
         """Return whether messages that arrive now may be delayed.
 
-        The guard did not run for a while, lost messages, or is still catching up.
+        That is so if the guard did not run for a while, lost messages, or is still catching up.
         """
         stalled = self._ticked is not None and now - self._ticked > STALLED_S
         return stalled or now < self._catching_up_until
 
     def tick(self, now: float) -> float:
-        """Note that the guard runs now, and return the watched seconds."""
+        """Record that the guard runs now, and return the watched seconds."""
         if self._ticked is not None and now - self._ticked > STALLED_S:
             self._catching_up_until = now + CATCH_UP_S
         self._seconds, self._ticked = self.time_at(now), now
@@ -115,29 +117,29 @@ class WatchedTime:
 
 @dataclass(slots=True)
 class Track:
-    """State of planned edges that arrive together, of one owner, kind and rate."""
+    """State of planned edges that arrive together and have the same owner, kind and rate."""
 
     edges: tuple[PlanEdge, ...]
-    #: Longest gap in seconds before the edges count as silent; None: they have no rate.
+    #: Longest gap in seconds after which the edges count as silent, None for edges without a rate.
     silent_after: float | None = field(init=False)
     #: Age of the last stamp at its arrival, in seconds.
     delay_s: float | None = None
     live: bool = False
-    #: The last arrival, in monotonic seconds.
+    #: Time of the last arrival, in monotonic seconds.
     last: float = 0.0
-    #: The last arrival, in watched seconds.
+    #: Time of the last arrival, in watched seconds.
     heard: float = 0.0
     silent: bool = False
     silent_since: float = 0.0
     steady: bool = False
     slow: bool = False
-    #: In watched time.
+    #: Arrivals in watched time.
     arrivals: Arrivals = field(default_factory=Arrivals)
     _window_ns: int = field(init=False)
 
     @property
     def edge(self) -> PlanEdge:
-        """One of the edges."""
+        """Any of the edges."""
         return self.edges[0]
 
     def __post_init__(self) -> None:
@@ -148,7 +150,7 @@ class Track:
             self.forget()
 
     def note_arrival(self, watched: float, now: float, *, late: bool = False) -> None:
-        """Note an arrival; two arrivals close together end an edge's silence.
+        """Record an arrival. Two arrivals in quick succession end a silence.
 
         ``late``: the message may have waited, so it does not count for the rate.
         """
@@ -162,11 +164,11 @@ class Track:
             )
 
     def forget(self) -> None:
-        """Treat the next arrival as the first one."""
+        """Treat the next arrival as the first."""
         self.arrivals = Arrivals(int(STRETCH * self._window_ns))
 
     def rate(self) -> float | None:
-        """Return the rate over the window in hertz, without its longest gap.
+        """Return the rate over the window in Hz, without the longest gap.
 
         None if there are too few arrivals.
         """
@@ -175,7 +177,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class SilentMemory:
-    """Edges, by their children, that are silent since a monotonic time in seconds."""
+    """Edges that have been silent since a time in monotonic seconds, by child frame."""
 
     since: float
     children: tuple[str, ...]
@@ -183,7 +185,7 @@ class SilentMemory:
 
 @dataclass(frozen=True, slots=True)
 class LivenessMemory:
-    """State for the next guard: edges by child frame, and owners that left."""
+    """State for a new guard: edges by child frame, and owners that left."""
 
     live: tuple[str, ...]
     slow: tuple[str, ...]
@@ -193,14 +195,14 @@ class LivenessMemory:
 
 @dataclass(slots=True, eq=False)
 class WrongEdges:
-    """Reports about edges, with their current locations in the robot file."""
+    """Edges in an open finding, with their current lines in the robot file."""
 
     edges: list[PlanEdge]
     finding_of: Callable[[Sequence[PlanEdge]], Finding]
 
     @property
     def finding(self) -> Finding:
-        """The finding."""
+        """The finding about the edges."""
         return self.finding_of(self.edges)
 
 
@@ -225,7 +227,7 @@ class Liveness:
         self._complete = False
         self._gone: set[str] = set()
         self._absent: set[str] = set()
-        #: Reported faults that are not over, by the edge's child: silence, a low rate.
+        #: Reported silence or low rate that has not ended, by the edge's child.
         self._wrong: dict[str, WrongEdges] = {}
         self._watched = WatchedTime()
 
@@ -235,7 +237,7 @@ class Liveness:
         return self._complete
 
     def follow(self, plan: Plan) -> None:
-        """Follow a plan that differs in its edges' lines, and in poses of fixed ones."""
+        """Follow a plan that differs only in lines of edges and in poses of fixed edges."""
         planned = {edge.child: edge for edge in plan.edges}
         for track in self.tracks:
             track.edges = tuple(planned[edge.child] for edge in track.edges)
@@ -243,9 +245,9 @@ class Liveness:
             reported.edges = [planned[edge.child] for edge in reported.edges]
 
     def absent(self, owner: str) -> None:
-        """Note that the owner was stopped on purpose.
+        """Record that the owner was stopped on purpose.
 
-        Its edges are neither live nor missing.
+        The owner's edges then count neither as live nor as missing.
         """
         self._absent.add(owner)
         self.changes += 1
@@ -259,11 +261,11 @@ class Liveness:
         self._note_over(_children(tracks))
 
     def present(self, owner: str) -> None:
-        """Note that the owner was started: its edges must be received again."""
+        """Record that the owner was started. Its edges must arrive again."""
         self._absent.discard(owner)
 
     def memory(self) -> LivenessMemory:
-        """Return the state for the next guard."""
+        """Return the state for a new guard."""
         silent = tuple(
             SilentMemory(track.silent_since, _children([track]))
             for track in self.tracks
@@ -273,9 +275,9 @@ class Liveness:
         return LivenessMemory(_children(live), _children(slow), silent, tuple(sorted(self._gone)))
 
     def recall(self, memory: LivenessMemory, now: float, until: float) -> None:
-        """Restore the previous guard's state, and report no silence before ``until``.
+        """Restore the previous guard's state. Report no silence before ``until``.
 
-        Discovery starts over.
+        The new guard has to discover all publishers again.
         """
         self._watched.begins_late(until)
         self._gone = set(memory.gone)
@@ -298,7 +300,7 @@ class Liveness:
     def note_arrivals(
         self, children: tuple[str, ...], now: float, delay_s: float | None = None
     ) -> list[GuardEvent]:
-        """Take edges that owners sent in one message; return the resulting events."""
+        """Record edges that owners sent in a message, and return the resulting events."""
         watched, late, events = self._watched.time_at(now), self._watched.is_behind(now), []
         for track in self._of_message.get(children) or self._part_tracks(children):
             if track.edge.owner in self._absent:
@@ -311,26 +313,26 @@ class Liveness:
         return events
 
     def _part_tracks(self, children: tuple[str, ...]) -> list[Track]:
-        """Return the tracks of exactly these edges; split tracks that have others too."""
-        wanted = set(children)
+        """Return the tracks of exactly these edges. Split tracks that contain other edges, too."""
+        names = set(children)
         touched = {id(track): track for child in children for track in (self._track_of[child],)}
-        found = []
+        tracks = []
         for track in touched.values():
-            rest = tuple(edge for edge in track.edges if edge.child not in wanted)
+            rest = tuple(edge for edge in track.edges if edge.child not in names)
             if rest:
                 part = replace(track, edges=rest, arrivals=deepcopy(track.arrivals))
                 self.tracks.append(part)
                 self._track_of.update((edge.child, part) for edge in rest)
-                track.edges = tuple(edge for edge in track.edges if edge.child in wanted)
+                track.edges = tuple(edge for edge in track.edges if edge.child in names)
                 self._of_message.clear()
-            found.append(track)
+            tracks.append(track)
         if len(self._of_message) > MOST_MESSAGES:
             self._of_message.clear()
-        self._of_message[children] = found
-        return found
+        self._of_message[children] = tracks
+        return tracks
 
     def _began(self, track: Track) -> list[GuardEvent]:
-        """Return events: the track's edges are live."""
+        """Return the events that the edges of the track are live."""
         owner = track.edge.owner
         self.changes += 1
         children = tuple(edge.child for edge in track.edges)
@@ -348,11 +350,11 @@ class Liveness:
         return events
 
     def seconds_since(self, track: Track, now: float) -> tuple[float, float | None]:
-        """Return the age of the last arrival and the rate in Hz, None while unknown."""
+        """Return the age of the last arrival in seconds, and the rate in Hz or None."""
         return now - track.last, track.rate() if track.silent_after is not None else None
 
     def silent(self) -> tuple[str, ...]:
-        """Return the children of edges that were live and no longer arrive."""
+        """Return the child frames of edges that were live and no longer arrive."""
         return _children(
             [
                 track
@@ -369,18 +371,18 @@ class Liveness:
         return self._watched.is_behind(now)
 
     def note_lost_messages(self, now: float) -> None:
-        """Note lost messages: until they are sent again, no owner counts as silent."""
+        """Record lost messages. Until they are sent again, no owner counts as silent."""
         self._watched.begins_late(now + CATCH_UP_S)
 
     def tick(self, now: float) -> None:
-        """Note that the guard runs, without judging owners."""
+        """Record that the guard runs, without judging owners."""
         self._watched.tick(now)
 
     def judge(self, now: float, speed: float = 1.0, *, paused: bool = False) -> list[GuardEvent]:
-        """Return which owners fell silent or slow since the last call, or recovered.
+        """Return an event for each owner that fell silent or slow, or recovered.
 
-        One event for each owner. ``speed`` is the real-time factor: rates are lower in a slow
-        simulation, and no owner falls silent in one that is ``paused``.
+        Changes since the previous call count. ``speed`` is the real-time factor, because rates are
+        lower in a slow simulation. In a ``paused`` simulation no owner falls silent.
         """
         watched = self._watched.tick(now)
         if paused:
@@ -419,11 +421,11 @@ class Liveness:
             self._wrong.pop(child, None)
 
     def _in_order(self, tracks: list[Track]) -> list[Track]:
-        """Return tracks by their first edge's place in the plan."""
+        """Return the tracks in the order of their first edges in the plan."""
         return sorted(tracks, key=lambda track: self._order[track.edge.child])
 
     def partly_missing(self) -> dict[str, list[str]]:
-        """Return the names of fixed edges that never came, by the node that sent others."""
+        """Return names of missing fixed edges by node, if other fixed edges of the node came."""
         if not any(self._waiting.values()):
             return {}
         fixed = [
@@ -439,9 +441,9 @@ class Liveness:
         return missing
 
     def static_writers(self, nodes: Collection[str]) -> list[GuardEvent]:
-        """Take the nodes that write /tf_static now.
+        """Process the nodes that currently publish on /tf_static.
 
-        An owner of live edges that is gone counts as silent.
+        An owner of live edges that has left counts as silent.
         """
         lost: dict[str, list[Track]] = {}
         events: list[GuardEvent] = []
@@ -464,7 +466,7 @@ class Liveness:
 
 
 def _wrong(change: str, tracks: list[Track], now: float) -> WrongEdges | None:
-    """Return the finding for tracks that fell silent or slow; None if they recovered."""
+    """Return the finding for tracks that fell silent or slow, None if they recovered."""
     edges = [edge for track in tracks for edge in track.edges]
     match change:
         case "silent":
@@ -477,7 +479,7 @@ def _wrong(change: str, tracks: list[Track], now: float) -> WrongEdges | None:
 
 
 def _recovery_event(change: str, tracks: list[Track], now: float) -> RecoveredShown:
-    """Return the event for tracks that arrive again, or at their rate again."""
+    """Return the event for tracks that arrive again, or arrive at their rate again."""
     edges = [edge for track in tracks for edge in track.edges]
     named, are = list_names([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
     if change == "back":

@@ -1,6 +1,6 @@
 """Watches for messages that the guard itself loses, so that no owner is blamed for them.
 
-If a burst of messages exceeds the buffers of the guard's sockets, the kernel drops the last ones.
+If a burst of messages exceeds the buffers of the guard's sockets, the kernel drops messages.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import GuardEvent
 
 CHECK_EVERY_S = 0.1
-#: The finding is over when no message was lost for this time.
+#: The finding ends when no message was lost for this time, in seconds.
 OVER_S = 10.0
 
 
 class LossWatch:
-    """Tells judges when the guard lost messages, and reports that once."""
+    """Tells the judges when the guard has lost messages, and reports the loss once."""
 
     def __init__(self, judges: Sequence[Judge], emit: Callable[[GuardEvent], None]) -> None:
         self._judges, self._emit = judges, emit
@@ -35,22 +35,22 @@ class LossWatch:
         self._wrong: list[Finding] = []
 
     def wrong(self) -> list[Finding]:
-        """Return the open finding."""
+        """Return the open finding, if there is one."""
         return self._wrong
 
     def check(self) -> None:
-        """Check for losses when due; call it before the judges judge."""
+        """Check for losses when due. Call this before the judges judge."""
         if (now := time.monotonic()) >= self._due:
             self._due = now + CHECK_EVERY_S
             self.take(self._lost.take(), now)
 
     def take(self, lost: int, now: float) -> None:
-        """Take the number of datagrams lost since the last call."""
+        """Process the number of datagrams lost since the last call."""
         if lost:
             self._over_at = now + OVER_S
             for judge in self._judges:
                 judge.live.note_lost_messages(now)
-            widen_buffers()  # the limit may be higher now
+            widen_buffers()  # the kernel's limit may be higher now
             if not self._wrong:
                 self._wrong = [datagrams_lost(lost, buffer_limit())]
                 self._emit(FindingShown(self._wrong[0]))
@@ -60,7 +60,7 @@ class LossWatch:
 
 
 def datagrams_lost(lost: int, limit: int | None) -> Finding:
-    """Return the finding for lost datagrams; a socket holds at most ``limit`` bytes."""
+    """Return the finding for lost datagrams. A socket buffer holds at most ``limit`` bytes."""
     message = (
         f"the guard itself lost {plural(lost, 'datagram')}: they arrived faster than it could"
         " read them"

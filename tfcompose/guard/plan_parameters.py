@@ -17,12 +17,16 @@ _DESCRIPTIONS = {
     "robot": "the robot's name",
     "file": "the name of the robot file",
     "profiles": "the profiles that are merged over the robot file",
+    "overlays": "the overlays that are merged over the robot file",
     "spec_digest": "the digest of the merged robot file; plan.json has the same",
 }
 
 
 class PlanParameters:
-    """Parameters of the guard's node, offered once no process waits for its reports."""
+    """Parameters of the guard's node.
+
+    They are offered as soon as no process waits for the guard's reports.
+    """
 
     def __init__(self, node: Node, plan: Plan) -> None:
         self._node = node
@@ -30,7 +34,7 @@ class PlanParameters:
         self._server: ParameterServer | None = None
 
     def check(self, judges: Sequence[Judge], now: float) -> None:
-        """Answer requests that have come, without blocking."""
+        """Answer received requests without blocking."""
         if self._server:
             self._server.check()
         elif not any(judge.is_starting(now) for judge in judges):
@@ -39,7 +43,7 @@ class PlanParameters:
             self._server = ParameterServer(self._node, self._values, _DESCRIPTIONS)
 
     def follow(self, plan: Plan) -> None:
-        """Report another plan."""
+        """Report the values of another plan."""
         self._values = _values(plan)
         if self._server:
             self._server.update(self._values)
@@ -50,6 +54,7 @@ def _values(plan: Plan) -> dict[str, Value]:
         "robot": plan.robot,
         "file": plan.file,
         "profiles": list(plan.profiles),
+        "overlays": list(plan.overlays),
         "spec_digest": plan.spec_digest,
         "use_sim_time": plan.ros.clock == "sim",
     }

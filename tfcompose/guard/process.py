@@ -1,10 +1,10 @@
-"""The guard's process: it watches TF topics until a signal comes.
+"""The guard's process, which watches TF topics until it receives a signal.
 
-It writes events to the launcher as lines of JSON on the descriptor that ``TFCOMPOSE_EVENTS_FD``
-names, or without a launcher to its own output. ``TFCOMPOSE_SETTLE_S`` is how long it observes
-before the other processes start. Robots with separate TF topics share one guard, with one judge
-for each pair of topics. Each pair is judged alone, because an edge that an owner may publish on
-its robot's topics is a violation on another's.
+It writes events to the launcher as lines of JSON on the descriptor in ``TFCOMPOSE_EVENTS_FD``.
+Without a launcher it writes to its standard output. ``TFCOMPOSE_SETTLE_S`` is the duration of the
+observation before the other processes start. Robots with separate TF topics share a guard, which
+has a judge for each pair of topics. Pairs are judged separately, because an edge may be correct on
+its own robot's topics and a violation on another robot's topics.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ from tfcompose.tf.live.topics import RunMarks, TFGraph, TFTopics
 from tfcompose.tf.process import ready, say
 from tfcompose.tf.ros.clock import ClockWatch, SimClock
 from tfcompose.tf.ros.environment import PROFILE_VARIABLES
-from tfcompose.tf.ros.graph import ids_say_who
+from tfcompose.tf.ros.graph import gid_identifies_node
 from tfcompose.tf.ros.node import DEEP, WaitSet, middleware, open_node
 from tfcompose.tf.ros.tf_codec import number_of_transforms
 
@@ -75,27 +75,27 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan, PlanProcess
     from tfcompose.tf.live.publishers import Message
     from tfcompose.tf.live.topics import TFData
-    from tfcompose.tf.process import Own
+    from tfcompose.tf.process import OwnProcess
 
     Topics = tuple[str, str]
 
 
 CHECK_EVERY_S = 0.1
-#: Extra delay of a check while messages arrive that must be forwarded, in seconds.
+#: Extra delay of a check, in seconds, while messages that must be forwarded arrive.
 LATE_S = 0.05
-#: A guard that passes nothing on lets messages gather this long between two steps, in seconds: a
-#: wake-up costs more than a message. After a step that took this many it does not, since readers
-#: keep a thousand.
+#: If the guard forwards nothing, messages gather for this time between two steps, in seconds,
+#: because a wake-up costs more than a message. After a step with this many messages the guard does
+#: not wait, because readers keep only a thousand.
 GATHER_S, GATHER_BELOW = 0.05, 100
-#: Period at which a strict guard reports what it held back, in seconds.
+#: Interval at which a strict guard reports blocked messages, in seconds.
 REPORT_EVERY_S = 10.0
 
 
 class TopicWatch:
-    """Feeds a judge with a pair of topics (moving, fixed).
+    """Passes messages and publishers of a pair of topics (moving, fixed) to a judge.
 
-    In a strict plan, forwards the admitted edges. ``private`` are the topics that the plan's
-    processes are remapped to, if they are.
+    In a strict plan, it forwards the admitted edges. If remappings isolate the plan's processes,
+    ``private`` holds their topics.
     """
 
     def __init__(
@@ -116,27 +116,27 @@ class TopicWatch:
         self._graph = TFGraph(
             node, topics, None if private is None else tuple(private.values()), ours=marks
         )
-        feedback = None if private is None else Feedback(node, private, self.data.own)
-        self.relay = Relay(node, self._graph, self.data.own, feedback) if strict else None
+        feedback = None if private is None else Feedback(node, private, self.data.own_gids)
+        self.relay = Relay(node, self._graph, self.data.own_gids, feedback) if strict else None
         self.judge = judge
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None
         self._due = self._report_due = 0.0
         self._malformed: dict[bytes | None, None] = {}
-        self._known: dict[bytes | None, None] = {}
+        self._gids: dict[bytes | None, None] = {}
         self._number_taken = 0
         self._decoder = self._reader.decoder
         self._flood = FloodReader(frozenset(edge.child for edge in judge.plan.edges))
         self._most = (
             len(judge.plan.edges) + MOST_UNDECLARED
-        )  # who sends more floods the tree, whatever it sends
+        )  # a publisher with more edges floods the tree
 
     def watch_global_topics(self) -> None:
-        """Find nodes of the plan that wrongly use the global topics."""
+        """Also report nodes of the plan that use the global topics by mistake."""
         self._leaks_to = self._graph.topics
 
     def begin(self, now: float, memory: dict[str, Any] | None) -> None:
-        """Skip the observation before the start: the start was long ago."""
+        """Skip the observation before the start, because the plan started long ago."""
         self._pass_on(
             self.judge.tick(now)
             if memory is None
@@ -149,30 +149,30 @@ class TopicWatch:
 
     @property
     def wait_s(self) -> float:
-        """How long the next step can wait at most, in seconds."""
+        """Maximum time until the next step, in seconds."""
         due_s = max(0.0, self._due - time.monotonic())
         return min(due_s, WAIT_S) if self._flood.is_reading else due_s
 
     @property
     def gather_s(self) -> float:
-        """How long messages may gather before the next step, in seconds."""
+        """Time for which messages may gather before the next step, in seconds."""
         is_prompt = self.relay is not None or self._flood.is_reading
         is_prompt = is_prompt or self.judge.is_starting(time.monotonic())
         return gather_s(self._number_taken, is_prompt=is_prompt)
 
     def close(self) -> None:
-        """End the readers and publishers that must end before the node."""
+        """Close the readers and publishers that must end before the node."""
         self.data.close()
 
     def step(self) -> None:
-        """Take new messages and, periodically, the graph."""
+        """Process new messages and, periodically, the ROS graph."""
         now = time.monotonic()
         if self._clock:
             self.judge.clock(self._clock.now_ns(), now)
         fenced = list(self.data.take_fenced())
-        strangers = self._take(fenced, now)  # first: it is passed on
+        strangers = self._take(fenced, now)  # first, because these are forwarded
         public = list(self.data.take_public())
-        if len(fenced if self.relay else public) >= DEEP:  # of the owners' some may be lost
+        if len(fenced if self.relay else public) >= DEEP:  # messages of owners may be lost
             self.judge.live.note_lost_messages(now)
         self._number_taken = len(fenced) + len(public)
         if self._by_partition:
@@ -180,13 +180,13 @@ class TopicWatch:
                 message.received.gid for message in public if message.received.gid
             )
         strangers |= self._take(public, now)
-        declared = self._flood.read(now)  # after the others, which wait for nothing
+        declared = self._flood.read(now)  # last, because it can wait
         if declared is not None:
             self._judge(self._read(declared, now), now)
-        # Delay messages in transit by a check as little as possible.
+        # A check should delay messages in transit as little as possible.
         if now >= self._due + (LATE_S if fenced else 0.0):
             self._due = self.judge.next_tick(now, CHECK_EVERY_S)
-            if not strangers:  # else it was asked for them
+            if not strangers:  # otherwise ``_take`` has already read it
                 self._ask_graph(now)
             if self._clock:
                 self.judge.clocks.sent = self._graph.sends_clock()
@@ -202,22 +202,25 @@ class TopicWatch:
                 say(f"held back: {held}")
 
     def _take(self, data: Iterable[TFData], now: float) -> bool:
-        """Take messages; return whether the graph had to be read first to identify senders."""
+        """Process messages. Return whether the graph was read to identify unknown senders."""
         messages = [_with_id(message) for message in data]
-        strangers = {message.received.gid for message in messages} - self._known.keys()
-        self._known |= dict.fromkeys(strangers)
-        if strangers:  # who sends once and goes is in the graph for a moment only
+        strangers = {message.received.gid for message in messages} - self._gids.keys()
+        self._gids |= dict.fromkeys(strangers)
+        if strangers:  # a short-lived sender is in the graph only briefly
             self._ask_graph(now)
         self._judge([sent for message in messages for sent in self._take_one(message, now)], now)
         return bool(strangers)
 
     def _judge(self, read: Iterable[tuple[JudgedMessage, Message]], now: float) -> None:
-        """Judge the arrivals of messages, after all of them are forwarded."""
+        """Judge the arrivals of messages, after all messages have been forwarded."""
         for judged, message in read:
             self._pass_on(self.judge.judge_arrival(judged, message, now))
 
     def _take_one(self, data: TFData, now: float) -> Iterator[tuple[JudgedMessage, Message]]:
-        """Take a message; long or unfamiliar ones from a flooding publisher are read in parts."""
+        """Process a message.
+
+        Long or unfamiliar messages of a flooding publisher are read in parts.
+        """
         received, judge = data.received, self.judge
         number = number_of_transforms(received.data)
         if number > self._most or judge.is_flooded_by(received.gid):
@@ -228,7 +231,7 @@ class TopicWatch:
         yield from self._read(data, now)
 
     def _read(self, data: TFData, now: float) -> Iterator[tuple[JudgedMessage, Message]]:
-        """Read a message and forward it; yield the parts to judge afterwards."""
+        """Decode a message and forward it. Yield the parts to judge afterwards."""
         received = data.received
         try:
             message = self._reader.read(received, static=data.static)
@@ -243,10 +246,10 @@ class TopicWatch:
         yield judged, message
 
     def _ask_graph(self, now: float) -> None:
-        """Take the current publishers; messages that waited for a name may pass."""
+        """Read the current publishers. Messages that waited for a name may then pass."""
         publishers = self._graph.publishers()
         present = {publisher.gid for publisher in publishers}
-        forget_oldest(self._known, present)
+        forget_oldest(self._gids, present)
         forget_oldest(self._malformed, present)
         self._pass_on(self.judge.graph(publishers, now))
         if self.relay:
@@ -262,7 +265,7 @@ class TopicWatch:
 
 
 def gather_s(taken: int, *, is_prompt: bool) -> float:
-    """Return the time to gather messages after a step, in seconds.
+    """Return the time for which messages may gather after a step, in seconds.
 
     ``is_prompt``: messages must not wait.
     """
@@ -270,7 +273,7 @@ def gather_s(taken: int, *, is_prompt: bool) -> float:
 
 
 def _run_marks(plan: Plan, profile: str) -> RunMarks:
-    """Return the identities in the environments of this run's processes.
+    """Return the marks by which processes of this run are recognised in their environments.
 
     A component has the environment of its container.
     """
@@ -292,9 +295,9 @@ def _run_marks(plan: Plan, profile: str) -> RunMarks:
 
 
 def _with_id(data: TFData) -> TFData:
-    """Return the data with the substitute id if the rmw does not identify the sender.
+    """Return the data with a substitute id if the rmw does not identify the sender.
 
-    The substitute distinguishes senders.
+    The substitute only distinguishes senders.
     """
     received = data.received
     return (
@@ -303,7 +306,7 @@ def _with_id(data: TFData) -> TFData:
 
 
 def count_held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int] | None:
-    """Return the blocked edges, or None if the guard blocks none."""
+    """Return counts of blocked transforms, None if the guard blocks none."""
     relays = [watch.relay for watch in watches if watch.relay]
     return (
         {key: count for relay in relays for key, count in relay.held.counts.items()}
@@ -313,21 +316,21 @@ def count_held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int
 
 
 def plans_by_topics(plan: Plan, guard: PlanProcess) -> dict[Topics, Plan]:
-    """Return the plan for each pair of topics, with the edges published on them.
+    """Return the plan for each pair of topics, with the edges published on these topics.
 
-    The guard's own topics are always among them.
+    The guard's own topics are always included.
     """
     parts = parts_of(plan)
-    own = parts.pop(guard.topics, None) or replace(plan, edges=())
-    return {guard.topics: own, **parts}
+    plan_of_robot = parts.pop(guard.topics, None) or replace(plan, edges=())
+    return {guard.topics: plan_of_robot, **parts}
 
 
 def together(
     emit: Callable[[GuardEvent], None], plans: Sequence[Plan]
 ) -> Callable[[GuardEvent], None]:
-    """Return the sink for events of the judges of these plans.
+    """Return the receiver of events from the judges of these plans.
 
-    It reports "all clear" and "tree complete" once, when the last judge has reported them.
+    It passes on "all clear" and "tree complete" only once, after the last judge has reported them.
     """
     waiting = {Clear: len(plans), TreeComplete: sum(bool(plan.edges) for plan in plans)}
 
@@ -349,24 +352,26 @@ def together(
 DEFAULT_SETTLE_S = 0.5
 
 
-def guard(own: Own, stop: Stop) -> None:
-    """Watch /tf and /tf_static until a signal comes."""
-    judges = own.plan.guard.mode != "off"
-    plans = plans_by_topics(own.plan, own.process)
+def guard(own_process: OwnProcess, stop: Stop) -> None:
+    """Watch /tf and /tf_static until a signal arrives."""
+    judges = own_process.plan.guard.mode != "off"
+    plans = plans_by_topics(own_process.plan, own_process.process)
     events = EventWriter(judges=judges)
     emit = together(events.emit, list(plans.values()))
     left = recall_memory(os.environ)
-    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
-        if not ids_say_who(node):
+    with open_node(
+        own_process.node_name, own_process.namespace, args=own_process.ros_args
+    ) as node:
+        if not gid_identifies_node(node):
             say(
                 "this rmw does not identify the sender of a message: if several nodes may have"
                 " sent it, findings name all of them"
             )
             if middleware() == IMPLEMENTATIONS["zenoh"]:
                 say("pip install 'tfcompose[zenoh]' reads it from Zenoh's liveliness tokens")
-        watches = _watches(own, node, plans, emit, left)
+        watches = _watches(own_process, node, plans, emit, left)
         judged = [watch.judge for watch in watches]
-        switches = Switches(node, own.plan, emit) if judges else None
+        switches = Switches(node, own_process.plan, emit) if judges else None
         memories: list[Memory | SwitchMemory] = [
             Memory(" ".join(topics), watch.judge, watch.relay, events.emit)
             for topics, watch in zip(plans, watches, strict=True)
@@ -374,17 +379,20 @@ def guard(own: Own, stop: Stop) -> None:
         if switches:
             memories.append(SwitchMemory(switches, events.emit, left))
         judging = "" if judges else ", without checks"
-        say(f"watching {plural(len(own.plan.edges), 'edge')}{judging}{' again' if left else ''}")
+        say(
+            f"watching {plural(len(own_process.plan.edges), 'edge')}{judging}"
+            f"{' again' if left else ''}"
+        )
         events.flush()
         ready()
         CATALOGUE.load()
-        diagnostics = DiagnosticsPage(node, own.plan.robot)
-        parameters = PlanParameters(node, own.plan)
-        joints = JointWatch(node, own.plan, emit)
+        diagnostics = DiagnosticsPage(node, own_process.plan.robot)
+        parameters = PlanParameters(node, own_process.plan)
+        joints = JointWatch(node, own_process.plan, emit)
         losses = LossWatch(judged, emit)
         wrong = [losses.wrong, joints.wrong, *(judge.wrong for judge in judged)]
         silence = [judge.live.wrong for judge in judged]
-        reread = partial(_reread, own, judged, switches, parameters)
+        reread = partial(_reread, own_process, judged, switches, parameters)
         descriptions = Descriptions(node, emit)
         orders = OrderReader(
             judged, Gates(node, emit), Components(node, emit), descriptions, reread
@@ -402,14 +410,14 @@ def guard(own: Own, stop: Stop) -> None:
         ]
         steps += [switches.check] if switches else []
         if ORDERS_FD not in os.environ:
-            steps += [LifecycleDriver(node, own.plan).check]
+            steps += [LifecycleDriver(node, own_process.plan).check]
             steps += (
-                [ComponentDriver(node, own, private=REMAPPED in os.environ).check]
-                if own.plan.components
+                [ComponentDriver(node, own_process, private=REMAPPED in os.environ).check]
+                if own_process.plan.components
                 else []
             )
         steps += [
-            ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check,
+            ClockWatch(node, say, sim=own_process.plan.ros.clock == "sim").check,
             *(watch.report for watch in watches),
         ]
         wait_set = WaitSet(node, [each for watch in watches for each in watch.data.readers], stop)
@@ -425,19 +433,21 @@ def guard(own: Own, stop: Stop) -> None:
 
 
 def _reread(
-    own: Own,
+    own_process: OwnProcess,
     judges: Sequence[Judge],
     switches: Switches | None,
     parameters: PlanParameters,
     file: str,
 ) -> None:
-    """Switch the judges to the plan in the file, without a new guard."""
+    """Switch the judges to the plan in the file, without restarting the guard."""
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
     except (OSError, ValueError, RejectedError) as error:
         say(f"findings still name lines of the previous plan: {error}")
         return
-    for judge, part in zip(judges, plans_by_topics(plan, own.process).values(), strict=True):
+    for judge, part in zip(
+        judges, plans_by_topics(plan, own_process.process).values(), strict=True
+    ):
         judge.follow(part)
     if switches:
         switches.follow(plan)
@@ -445,30 +455,37 @@ def _reread(
 
 
 def _watches(
-    own: Own,
+    own_process: OwnProcess,
     node: Node,
     plans: dict[Topics, Plan],
     emit: Callable[[GuardEvent], None],
     left: dict[str, Any],
 ) -> list[TopicWatch]:
-    """Return the watch over each pair of topics.
+    """Return the watch for each pair of topics.
 
-    A watch that follows a previous guard, or has mode off, skips the observation.
+    A watch that follows a previous guard, or is in mode ``off``, skips the observation.
     """
-    judges, joins = own.plan.guard.mode != "off", bool(os.environ.get(JOINS))
+    judges, joins = own_process.plan.guard.mode != "off", bool(os.environ.get(JOINS))
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges and not joins else 0.0
-    private = private_topics(own.plan) if REMAPPED in os.environ else None
+    private = private_topics(own_process.plan) if REMAPPED in os.environ else None
     now = time.monotonic()
-    says_who = ids_say_who(node)
+    identifies_node = gid_identifies_node(node)
     watches = []
     for topics, plan in plans.items():
-        # A guard that joins, or does not judge, accepts every owner as the plan's, even if it
-        # began earlier.
+        # A guard that joins a running plan, or does not judge, accepts every owner as the plan's
+        # owner, even if the owner began earlier.
         begun_ns = 0 if joins or not judges else time.time_ns()
         judge = Judge(
-            plan, settle_s, now, begun_ns, says_who=says_who, remapped=private is not None
+            plan,
+            settle_s,
+            now,
+            begun_ns,
+            gid_identifies_node=identifies_node,
+            remapped=private is not None,
         )
-        watches.append(TopicWatch(node, topics, judge, emit, _of(private, own.plan, topics)))
+        watches.append(
+            TopicWatch(node, topics, judge, emit, _of(private, own_process.plan, topics))
+        )
         if joins or not judges:
             watches[-1].begin(now, left.get(" ".join(topics)))
     if GLOBAL not in plans:
@@ -477,7 +494,7 @@ def _watches(
 
 
 def _of(private: dict[str, Topics] | None, plan: Plan, topics: Topics) -> dict[str, Topics] | None:
-    """Return the remapped topics of the plan's processes that would send on these topics."""
+    """Return the remapped topics of the plan's processes that would publish on these topics."""
     if private is None:
         return None
     return {name: pair for name, pair in private.items() if plan.process(name).topics == topics}

@@ -1,9 +1,10 @@
-"""Relay of a strict guard: it forwards the edges that each process owns.
+"""Relay of a strict guard, which forwards the edges that each process owns.
 
-A message whose edges all belong to its sender is forwarded unchanged, byte for byte. Foreign edges
-are removed from other messages. Each sender of fixed edges has a latched publisher here, so that
-late joiners receive all of them while the sender is present, even if it sent them one after the
-other. A guard that replaces one that died latches them again.
+If the sender owns all edges of a message, the message is forwarded unchanged, byte for byte.
+Otherwise, edges that the sender does not own are removed. For each sender of fixed edges, the
+relay has a latched publisher. While the sender is present, late joiners receive all its fixed
+edges, even if it sent them in separate messages. A new guard that replaces a guard that died
+latches the edges again.
 """
 
 from __future__ import annotations
@@ -27,26 +28,26 @@ if TYPE_CHECKING:
 
     Edge = tuple[str, str]
     Topics = tuple[str, str]
-    #: Says which edges of a message may pass; None: all.
+    #: Returns the edges of a message that may pass, None for all edges.
     Admits = Callable[[Message], Collection[Edge] | None]
 
-#: The parts of a guard's memory that are a sender's fixed edges begin so.
+#: Prefix of keys in the guard's memory that hold the fixed edges of a sender.
 _LATCHED = "latched:"
-#: The most messages that are kept for listeners that have not received them yet. tf2's depth of
-#: 100 is that of one publisher; all publishers of the robot may send at the same moment.
+#: Maximum number of messages kept for listeners. tf2 uses a depth of 100 for a single publisher.
+#: Here all publishers of the robot may send at the same moment.
 KEPT = 500
-#: Maximum number of senders whose held-back edges are counted.
+#: Maximum number of senders whose blocked edges are counted.
 MOST_COUNTED = 1000
 NAMED_AT_MOST = 6
 #: Maximum number of messages with fixed edges that wait for their senders' names.
 MOST_WAITING = 200
-#: Maximum number of refused publishers that are reported by name.
+#: Maximum number of rejected publishers to report by name.
 MOST_REFUSED = 100
 
 
 @dataclass(slots=True)
 class _Latched:
-    """The fixed edges of one sender by child, and the process whose topic they came on."""
+    """The fixed edges of a sender by child, and the process on whose topic they arrived."""
 
     publisher: TFPublisher
     process: str
@@ -55,25 +56,25 @@ class _Latched:
 
 
 class Relay:
-    """Forwards messages of isolated processes on one pair of topics (moving, fixed).
+    """Forwards messages of isolated processes on a pair of topics (moving, fixed).
 
-    Adds the ids of its publishers to ``own``. ``feedback``: remappings isolate the processes.
-    ``changes`` counts changes of the latched edges.
+    It adds the ids of its publishers to ``own_gids``. ``feedback`` is set if remappings isolate
+    the processes. ``changes`` counts changes of the latched edges.
     """
 
     def __init__(
         self,
         node: Node,
         graph: TFGraph,
-        own: set[bytes | None],
+        own_gids: set[bytes | None],
         feedback: Feedback | None = None,
     ) -> None:
         self._node = node
         self._graph = graph
-        self._own = own
+        self._own = own_gids
         self._feedback = feedback
         self._moving = TFPublisher(node, static=False, topic=graph.topics[0], qos=KEPT)
-        own.add(self._moving.raw_gid)
+        own_gids.add(self._moving.raw_gid)
         self._fixed: dict[bytes, _Latched] = {}
         self._refused: dict[bytes, None] = {}
         self._finds_until = 0.0
@@ -84,13 +85,13 @@ class Relay:
     def pass_on(
         self, sent: TFData, message: Message, admitted: Collection[Edge] | None, who: str
     ) -> None:
-        """Forward the admitted part of a message from ``who``; None: all of it."""
+        """Forward the admitted edges of a message from ``who``; None: forward all edges."""
         if self._feedback and not sent.fenced:
-            self._feed(self._feedback, sent, message)  # everybody has it
+            self._feed(self._feedback, sent, message)  # all listeners have received it
             return
         gid = sent.received.gid
         if gid is None or not sent.fenced:
-            return  # it has reached everybody, or nobody knows whose it is
+            return  # all listeners have it, or its sender is unknown
         match self._graph.may_pass(gid):
             case True if who:
                 self._pass_admitted(gid, sent, message, admitted, who)
@@ -110,7 +111,7 @@ class Relay:
         if admitted is not None:
             self.held.count(message, admitted, who)
         elif not message.exact:
-            admitted = message.edges  # it is sent anew, with the names that were judged
+            admitted = message.edges  # encode it again, with the judged names
         data = sent.received.data
         if message.static:
             self._latch(gid, data, message, admitted, sent.process)
@@ -120,9 +121,10 @@ class Relay:
             self._send(encode(list(_admit(data, message, admitted))), sent.process)
 
     def memory(self) -> dict[str, Any]:
-        """Return the latched edges for the next guard.
+        """Return the latched edges for a new guard.
 
-        It cannot get them from the senders, because not all of them latch all their edges.
+        A new guard cannot get them from the senders, because not every sender latches all its
+        edges.
         """
         return {
             f"{_LATCHED}{gid.hex()}": [sender.process, b64encode(sender.data).decode()]
@@ -132,8 +134,7 @@ class Relay:
     def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
         """Latch the previous guard's edges that may still pass.
 
-        Their senders count as present ``until`` that time, because they have to be discovered
-        again.
+        Their senders count as present ``until`` this time, because they must be discovered again.
         """
         self._finds_until = until
         for part, entry in memory.items():
@@ -146,7 +147,7 @@ class Relay:
                 self._latch(gid, data, message, admits(message), entry[0])
 
     def update(self, writers: Collection[Publisher], now: float) -> None:
-        """Latch the edges of senders that remain in the graph, and send them to listeners."""
+        """Latch the edges of senders that are still in the graph, and send them to listeners."""
         if now >= self._finds_until:
             present = {writer.gid for writer in writers}
             for gid in [gid for gid in self._fixed if gid not in present]:
@@ -159,23 +160,23 @@ class Relay:
             self._feedback.update()
 
     def _forget_others(self, writers: Collection[Publisher], present: Collection[bytes]) -> None:
-        """Stop feeding edges of publishers outside the plan's processes that have left.
+        """Stop forwarding edges of publishers that have left and are not processes of the plan.
 
-        If ids do not identify publishers, stop when all have left.
+        If ids do not identify publishers, stop when all such publishers have left.
         """
         if self._feedback is None:
             return
-        others = self._feedback.sources("")
-        if not self._graph.says_who and any(
+        sources = self._feedback.sources("")
+        if not self._graph.gid_identifies_node and any(
             writer.static and not writer.fenced for writer in writers
         ):
             return
-        self._feedback.forget([source for source in others if source not in present])
+        self._feedback.forget([source for source in sources if source not in present])
 
     def _refuse(self, gid: bytes) -> None:
-        """Report once that a publisher's messages are dropped.
+        """Report once that the relay drops a publisher's messages.
 
-        Its node may have an owner's name.
+        The name of its node may be the name of an owner.
         """
         if gid in self._refused or len(self._refused) >= MOST_REFUSED:
             return
@@ -192,8 +193,8 @@ class Relay:
     @staticmethod
     def _feed(feedback: Feedback, sent: TFData, message: Message) -> None:
         if message.static:
-            found = {t.child: t for t in decode(sent.received.data)}
-            feedback.latch_fixed(sent.received.raw_gid or b"", found, "")
+            transforms = {t.child: t for t in decode(sent.received.data)}
+            feedback.latch_fixed(sent.received.raw_gid or b"", transforms, "")
         else:
             feedback.moving(sent.received.data, "")
 
@@ -205,14 +206,14 @@ class Relay:
         admitted: Collection[Edge] | None,
         process: str,
     ) -> None:
-        found = {t.child: t for t in _admit(data, message, admitted)}
+        transforms = {t.child: t for t in _admit(data, message, admitted)}
         latched = self._fixed.get(gid)
         if latched is None:
-            if not found:
+            if not transforms:
                 return
             latched = self._new(gid, process)
-        is_all = admitted is None and found.keys() >= latched.edges.keys()
-        latched.edges |= found
+        is_all = admitted is None and transforms.keys() >= latched.edges.keys()
+        latched.edges |= transforms
         latched.data = data if is_all else encode(list(latched.edges.values()))
         latched.publisher.publish(latched.data)
         if self._feedback:
@@ -235,7 +236,7 @@ def _admit(
 
 
 class HeldBack:
-    """Blocked transforms: ``counts`` by sender's node, parent and child."""
+    """Blocked transforms; ``counts`` is by sender's node, parent and child."""
 
     def __init__(self) -> None:
         self.counts: dict[tuple[str, str, str], int] = {}
@@ -251,7 +252,7 @@ class HeldBack:
                 self.counts[key] = self.counts.get(key, 0) + 1
 
     def report(self) -> str:
-        """Return how many transforms were blocked since the last call, and whose; empty: none."""
+        """Return a sentence with newly blocked transforms and their senders; "" without any."""
         now = {
             key: count for key, count in self.counts.items() if count != self._reported.get(key)
         }
@@ -266,7 +267,7 @@ class HeldBack:
 
 @dataclass(slots=True)
 class _Listener:
-    """A process's topics, and their publishers: None until there is a subscriber."""
+    """A process's topics and the publishers on them, which are None without a subscriber."""
 
     topics: Topics
     moving: TFPublisher | None = None
@@ -275,21 +276,23 @@ class _Listener:
 
 
 class Feedback:
-    """Sends foreign TF to processes that are isolated by remapping.
+    """Sends TF of other publishers to processes that remappings isolate.
 
-    While a process has subscribers, moving edges are forwarded at once and fixed ones latched, all
-    in one message. Adds the ids of its publishers to ``own``, because the node listens there
-    itself.
+    While a process has subscribers, moving edges are forwarded at once, and all fixed edges are
+    latched in a single message. Ids of its publishers are added to ``own_gids``, because the node
+    also subscribes to these topics.
     """
 
-    def __init__(self, node: Node, private: Mapping[str, Topics], own: set[bytes | None]) -> None:
+    def __init__(
+        self, node: Node, private: Mapping[str, Topics], own_gids: set[bytes | None]
+    ) -> None:
         self._node = node
-        self._own = own
+        self._own = own_gids
         self._listeners = {process: _Listener(topics) for process, topics in private.items()}
         self._fixed: dict[bytes, tuple[str, dict[str, SentTransform]]] = {}
 
     def update(self) -> None:
-        """Find the current listeners, and latch changes for them."""
+        """Find the current listeners, and latch changed edges for them."""
         for process, listener in self._listeners.items():
             if listener.moving is None and self._is_heard(listener.topics[0]):
                 listener.moving = self._publisher(listener.topics[0], static=False)
@@ -300,15 +303,15 @@ class Feedback:
                 listener.fixed.publish(encode(self._rest(process)))
 
     def moving(self, data: bytes, sender: str) -> None:
-        """Send a message to all processes except its ``sender``; empty: to all."""
+        """Send a message to all processes except ``sender``; to all if ``sender`` is empty."""
         for process, listener in self._listeners.items():
             if listener.moving and process != sender:
                 listener.moving.publish(data)
 
     def latch_fixed(self, source: bytes, edges: Mapping[str, SentTransform], sender: str) -> None:
-        """Latch the fixed edges of one source, by child, at the next update."""
-        known = self._fixed.pop(source, (sender, {}))[1]  # the newest comes last
-        self._fixed[source] = (sender, {**known, **edges})
+        """Latch the fixed edges of a source, by child, at the next update."""
+        latched = self._fixed.pop(source, (sender, {}))[1]  # the newest comes last
+        self._fixed[source] = (sender, {**latched, **edges})
         self._outdate_all_but(sender)
 
     def forget(self, sources: Collection[bytes]) -> None:
@@ -317,9 +320,9 @@ class Feedback:
             self._outdate_all_but(self._fixed.pop(source)[0])
 
     def sources(self, sender: str) -> list[bytes]:
-        """Return the sources of fixed edges from that process.
+        """Return the sources of fixed edges from the process.
 
-        Empty: those outside the plan's processes.
+        If ``sender`` is empty, return sources outside the plan's processes.
         """
         return [source for source, (process, _) in self._fixed.items() if process == sender]
 

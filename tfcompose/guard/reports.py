@@ -1,4 +1,4 @@
-"""Reports of publishers that listeners do not receive, and the pace of reports."""
+"""Reports about publishers that listeners do not receive, and the frequency of reports."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tfcompose.guard.verdict.publishers import (
     unmarked_finding,
     volatile_publisher,
 )
-from tfcompose.model.messages import FindingShown, Unfenced
+from tfcompose.model.messages import FilterBypassed, FindingShown
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live.publishers import UNCOUNTED
 
@@ -26,32 +26,36 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.publishers import Publisher, Senders
 
 Key = TypeVar("Key")
-#: Time for which further reports of one kind are collected after the first; longer while more
-#: arrive: a tracker that names frames after objects has new ones each second.
+#: Time in seconds for which reports are collected after a report of the same kind. It grows while
+#: more arrive, for example from a tracker that names frames after objects.
 COLLECTED_S = 0.5
 COLLECTED_AT_MOST_S = 60.0
-#: The most publishers, and kinds of reports, that are remembered as reported.
+#: Maximum number of publishers and kinds of reports that are remembered as reported.
 MOST_REPORTED = 2000
-#: Time for which a flood is counted before it is reported, in seconds.
+#: Time in seconds for which messages of a flood are counted before the report.
 FLOOD_COUNTED_S = 1.0
-#: After this time, an owner's latched message has surely replaced its earlier ones, in seconds.
+#: After this time in seconds, an owner's latched message has certainly replaced its earlier
+#: messages.
 ALL_HEARD_S = 2.0
-#: Time to wait for messages of a publisher that bypasses the fence, so that they are reported
-#: before it is stopped.
+#: Time in seconds to wait for messages of a publisher that bypasses the filter, so that they are
+#: reported before the publisher is stopped.
 UNFENCED_SILENT_S = 0.5
 _UNFENCED = "TF852"
 
 
 class Pace(Generic[Key]):
-    """Due times of reports by kind: the more often one is due, the longer the next ones wait."""
+    """Due times of reports by kind.
+
+    The more often a report is due, the longer the next one waits.
+    """
 
     def __init__(self) -> None:
         self._reported: dict[Key, tuple[float, float]] = {}
 
     def is_due(self, key: Key, now: float, *, grows: bool) -> bool:
-        """Return whether a report is due, and count it as made.
+        """Return whether a report is due, and record it as made.
 
-        If the pace ``grows``, later ones wait longer.
+        If the pace ``grows``, later reports wait longer.
         """
         reported, collected_s = self._reported.pop(key, (-COLLECTED_AT_MOST_S, 0.0))
         if now - reported < collected_s:
@@ -69,12 +73,12 @@ class Pace(Generic[Key]):
 class Flood:
     """Messages of a publisher since it exceeded the limit of undeclared edges."""
 
-    #: When it exceeded the limit, in monotonic seconds.
+    #: Time when the publisher exceeded the limit, in monotonic seconds.
     since: float
-    #: The last message, in monotonic seconds.
+    #: Time of the last message, in monotonic seconds.
     last: float = 0.0
     messages: int = 0
-    #: Transforms in the longest message.
+    #: Number of transforms in the longest message.
     transforms: int = 0
 
     def count(self, transforms: int, now: float) -> None:
@@ -87,15 +91,16 @@ class Flood:
 
     @property
     def hertz(self) -> float | None:
-        """Messages per second; None if unknown."""
+        """Messages per second, None if unknown."""
         took_s = self.last - self.since
         return (self.messages - 1) / took_s if self.messages > 1 and took_s > 0 else None
 
 
 class PublisherReports:
-    """Publishers whose QoS or topic keeps listeners from receiving all of their messages.
+    """Publishers whose QoS or topic prevents listeners from receiving all their messages.
 
-    Each is reported once, also across guards that replace each other; ``changes`` counts reports.
+    Each publisher is reported once, even if a new guard replaces a guard that died. ``changes``
+    counts reports.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -116,10 +121,10 @@ class PublisherReports:
     def wrong_settings(self, publishers: Sequence[Publisher]) -> list[FindingShown]:
         """Return findings for publishers with a QoS that no listener accepts."""
         return [
-            found
+            finding
             for publisher in publishers
             for wrong in self._wrong_settings(publisher)
-            for found in self._once(publisher, wrong)
+            for finding in self._once(publisher, wrong)
         ]
 
     def _wrong_settings(self, publisher: Publisher) -> Iterator[Finding]:
@@ -139,9 +144,9 @@ class PublisherReports:
     def leaving_the_fence(
         self, publishers: Sequence[Publisher], senders: Senders, now: float
     ) -> list[Publisher]:
-        """Return the run's own publishers that bypass the filter, once judged.
+        """Return publishers of the run that bypass the filter and whose messages were judged.
 
-        One that sends nothing is returned after a while.
+        A publisher that sends nothing is returned after a while.
         """
         outside = [
             publisher
@@ -161,10 +166,10 @@ class PublisherReports:
             if senders.sender(publisher.gid) or now - since[publisher.gid] >= UNFENCED_SILENT_S
         ]
 
-    def report_unfenced(self, publisher: Publisher, *, remapped: bool) -> list[Unfenced]:
+    def report_unfenced(self, publisher: Publisher, *, remapped: bool) -> list[FilterBypassed]:
         """Return the finding for a publisher that bypasses the filter.
 
-        ``remapped``: remappings isolate the others.
+        ``remapped``: remappings isolate the other processes.
         """
         topic = publisher.topic or GLOBAL[publisher.static]
         if publisher.unmarked:
@@ -181,29 +186,29 @@ class PublisherReports:
             )
         process = "" if publisher.unmarked else publisher.process
         return [
-            Unfenced(new.found, process, publisher.unmarked)
+            FilterBypassed(new.found, process, publisher.unmarked)
             for new in self._once(publisher, finding)
         ]
 
     def floods(
         self, senders: Senders, flooders: dict[bytes | None, Flood], now: float
     ) -> list[FindingShown]:
-        """Return the findings for publishers of more undeclared edges than are judged.
+        """Return findings for publishers of more undeclared edges than the judge accepts.
 
-        Drops those that have left.
+        Publishers that have left are removed from ``flooders``.
         """
-        found = []
+        findings = []
         for gid, flooder in list(flooders.items()):
-            publisher = senders.known.get(gid) if gid is not None else None
+            publisher = senders.by_gid.get(gid) if gid is not None else None
             if publisher is None or not publisher.node or now - flooder.since < FLOOD_COUNTED_S:
                 continue
-            found += self._once(
+            findings += self._once(
                 publisher,
                 flood(publisher.node, publisher.where, flooder.transforms, flooder.hertz),
             )
             if not senders.is_present(gid):
                 del flooders[gid]
-        return found
+        return findings
 
     def leaks(
         self, publishers: Sequence[Publisher], topics: tuple[str, str]
@@ -211,11 +216,11 @@ class PublisherReports:
         """Return findings for nodes of the plan that use the global topics by mistake."""
         inside = f"/{self._plan.ros.namespace.strip('/')}/"
         return [
-            found
+            finding
             for publisher in publishers
             if publisher.node
             and (publisher.node in self._nodes or publisher.node.startswith(inside))
-            for found in self._once(
+            for finding in self._once(
                 publisher, leak(publisher.node, GLOBAL[publisher.static], topics[publisher.static])
             )
         ]
@@ -223,25 +228,25 @@ class PublisherReports:
     def report_replaced(
         self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float
     ) -> list[FindingShown]:
-        """Return the findings for nodes that sent latched messages before they were first heard.
+        """Return findings for nodes whose earlier latched messages were replaced before arrival.
 
-        ``missing`` has, by node, the names of fixed edges that did not come although others of the
-        node did.
+        ``missing`` holds, by node, the names of fixed edges that did not arrive although other
+        fixed edges of the node did.
         """
-        found = []
+        findings = []
         for publisher in senders.present.values() if missing else ():
             edges, sender = missing.get(publisher.node or ""), senders.sender(publisher.gid)
             if not (publisher.node and publisher.static and edges and sender):
                 continue
             first = sender.first_sequence
             if 1 < first < UNCOUNTED and now - sender.first_received >= ALL_HEARD_S:
-                found += self._once(
+                findings += self._once(
                     publisher, replaced_latched_finding(publisher.node, first - 1, edges)
                 )
-        return found
+        return findings
 
     def memory(self) -> tuple[tuple[str, str], ...]:
-        """Return the reports made: codes with publisher ids in hexadecimal."""
+        """Return the reports made so far: codes with publisher ids in hexadecimal."""
         return tuple(sorted((code, gid.hex()) for code, gid in self._reported))
 
     def recall(self, memory: tuple[tuple[str, str], ...]) -> None:

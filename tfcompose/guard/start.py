@@ -1,4 +1,4 @@
-"""Start of the guard's process, which loads ROS once it handles signals."""
+"""Start of the guard's process, which loads ROS after it handles signals."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.foundation.signals import Stop
-    from tfcompose.tf.process import Own
+    from tfcompose.tf.process import OwnProcess
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run the guard that PLAN_FILE PROCESS_NAME names, and return the exit code."""
+    """Run the guard with arguments PLAN_FILE PROCESS_NAME, and return the exit code."""
     return start(argv, "guard", _guard)
 
 
-def _guard(own: Own, stop: Stop) -> None:
+def _guard(own_process: OwnProcess, stop: Stop) -> None:
     from tfcompose.guard.process import guard  # noqa: PLC0415 (ROS, once signals are handled)
 
-    guard(own, stop)
+    guard(own_process, stop)

@@ -1,7 +1,7 @@
-"""One child process: bound to the launcher, leader of its own group, read without blocking.
+"""A child process: bound to the launcher, leader of its own group, and read without blocking.
 
-The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own
-children. The reaper kills those.
+When the launcher dies, the kernel sends SIGKILL to its children (PR_SET_PDEATHSIG), but not to the
+children's children. The reaper kills these.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import PlanProcess
     from tfcompose.model.plan.components import LoadRequest
 
-#: A line longer than this comes in pieces; bytes.
+#: Maximum length of a line, in bytes. A longer line is split into pieces.
 LINE_LIMIT = 64 * 1024
-#: Maximum size of one read, so that a process that floods leaves time for the others; bytes.
+#: Maximum bytes per read, so that a process with much output leaves time for other processes.
 READ_SIZE = 64 * 1024
-#: Output limits of a process: at once, and per second. More is read and counted, but dropped;
-#: bytes.
+#: Limits of a process's output: burst in bytes, and rate in bytes per second. Output beyond these
+#: limits is read and counted, but dropped.
 BURST = 8_000_000
 PER_SECOND = 1_000_000
-#: The end of what is thrown away is kept, and comes when there is time again: a process's last
-#: words count; bytes.
+#: Number of dropped bytes to keep. They are passed on when the limits permit, because the last
+#: output of a process is important.
 TAIL = 4096
-#: Maximum output read from a process that has ended: more than a pipe holds, but bounded; bytes.
+#: Maximum bytes to read from a process that has ended. A pipe holds less.
 DRAIN_LIMIT = 1024 * 1024
 
 #: The size of a pseudo-terminal: lines and columns.
@@ -65,27 +65,27 @@ class ChildCommand:
     argv: tuple[str, ...]
     env: dict[str, str]
     folder: Path
-    #: True: one of tfcompose's own processes.
-    own: bool = False
-    #: The plan's process, whose settings apply to the child.
+    #: Whether it is one of tfcompose's own processes.
+    is_built_in: bool = False
+    #: The process in the plan, whose settings apply to the child.
     process: PlanProcess | None = None
     #: Path and content of a profile file that must exist before the start.
     fence: tuple[Path, str] | None = None
-    #: The reason why it cannot be started, if the run goes on without it.
+    #: The reason why the process cannot start, if the run continues without it.
     missing: str = ""
-    #: A component: the request to its container, sent instead of starting a process.
+    #: For a component: the request to its container, which is sent instead of starting a process.
     load: LoadRequest | None = None
 
 
 class Lines:
-    """Splits bytes into lines, and keeps no more than the limit between two calls."""
+    """Splits bytes into lines. Between two calls it keeps at most ``limit`` bytes."""
 
     def __init__(self, limit: int = LINE_LIMIT) -> None:
         self._limit = limit
         self._rest = b""
 
     def feed(self, data: bytes) -> Iterator[str]:
-        """Yield the lines completed by ``data``, and pieces of a line that exceeds the limit."""
+        """Yield the lines that ``data`` completes, and pieces of a line that exceeds the limit."""
         *complete, self._rest = (self._rest + data).split(b"\n")
         for line in complete:
             yield from self._pieces(line)
@@ -94,7 +94,7 @@ class Lines:
             yield _text(piece)
 
     def end(self) -> Iterator[str]:
-        """Yield the rest after the last newline, if there is any."""
+        """Yield the text after the last newline, if there is any."""
         if self._rest:
             yield _text(self._rest)
         self._rest = b""
@@ -105,12 +105,12 @@ class Lines:
 
 
 def _text(line: bytes) -> str:
-    """Return the line as a terminal finally shows it: a progress bar overwrites itself."""
+    """Return the line as a terminal finally shows it, after carriage returns."""
     return line.rstrip(b"\r").rpartition(b"\r")[2].decode(errors="replace")
 
 
 class Bucket:
-    """Rate limit for a process's output, over all its pipes, with a count of the dropped bytes."""
+    """Limit for the output of a process over all its pipes, with a count of dropped bytes."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -124,8 +124,8 @@ class Bucket:
         now = self._clock()
         self._left = min(BURST, self._left + (now - self._at) * PER_SECOND)
         self._at = now
-        # Once it is empty, it is filled a little, so that what is kept comes in pieces that can be
-        # read.
+        # After the bucket is empty, it must fill up to a second's amount. Then the kept output
+        # comes in readable pieces.
         self._dry = self._left < (PER_SECOND if self._dry else size)
         self._left -= 0 if self._dry else size
         return not self._dry
@@ -151,11 +151,11 @@ class Pipe:
     def read(self) -> int | None:
         """Pass on some of the available bytes.
 
-        Returns the number of bytes: 0 at the end, None if nothing is available now.
+        Return the number of bytes: 0 at the end, None if no bytes are available now.
         """
         try:
             data = self.file.read(READ_SIZE)
-        except OSError as error:  # what a pseudo-terminal says when nobody has its other end
+        except OSError as error:  # a pseudo-terminal whose other end is closed
             if error.errno != errno.EIO:
                 raise
             data = b""
@@ -179,7 +179,7 @@ class Pipe:
         self._tail = kept
 
     def _catch_up(self, bucket: Bucket) -> None:
-        """Report how much was dropped, and continue at the start of a line."""
+        """Report the number of dropped bytes, and continue at the start of a line."""
         tail, self._tail = self._tail, b""
         if bucket.thrown and b"\n" in tail[:-1]:
             begin = tail.index(b"\n") + 1
@@ -195,7 +195,7 @@ class Pipe:
             self._sink(line)
 
     def drain(self) -> None:
-        """Pass on the remaining output of a process that has ended, then close."""
+        """Pass on the remaining output of a process that has ended, then close the pipe."""
         left = DRAIN_LIMIT
         try:
             while left > 0 and (count := self.read()):
@@ -210,7 +210,7 @@ class Pipe:
 
 @dataclass(slots=True)
 class Child:
-    """A running process, its pipes, and the end of what it wrote to each."""
+    """A running process, its pipes, and the last lines that it wrote to each pipe."""
 
     name: str
     popen: Running
@@ -222,16 +222,19 @@ class Child:
 
     @property
     def last_lines(self) -> tuple[str, ...]:
-        """Its last lines of output, stderr last because two pipes have no common order."""
+        """The last lines of output.
+
+        Lines of stderr come last, because the order of lines across two pipes is unknown.
+        """
         return (*self.last_out, *self.last_err)[-LAST_LINES:]
 
 
 class Running(Protocol):
-    """A started process; ``subprocess.Popen`` is one."""
+    """A started process, such as ``subprocess.Popen``."""
 
     @property
     def pid(self) -> int:
-        """The process id, also the id of its group."""
+        """The process id, which is also the id of the process's group."""
 
     @property
     def stdout(self) -> IO[bytes] | FileIO | None:
@@ -242,28 +245,28 @@ class Running(Protocol):
         """The pipe of its standard error."""
 
     def wait(self) -> int:
-        """Wait for its end; return its exit code, or minus the number of the signal."""
+        """Wait for the process to end. Return its exit code, or minus the number of the signal."""
 
 
 def spawn(command: ChildCommand, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
-    """Start the command as the leader of a new session, with its output in pipes.
+    """Start the command as the leader of a new session, with pipes for its output.
 
-    One of tfcompose's own processes starts with the ending signals blocked, and unblocks them once
-    it handles them (``tfcompose.signals``). A signal that arrives while Python starts stays
-    pending: it neither kills the process nor prints a traceback.
+    A process of tfcompose starts with the ending signals blocked, and unblocks them when it
+    handles them (``tfcompose.signals``). A signal that arrives while Python starts therefore stays
+    pending. It neither kills the process nor causes a traceback.
 
     Raises:
-        OSError: if it cannot be started.
+        OSError: if the command cannot be started.
     """
     launcher = os.getpid()
 
     def before_the_program() -> None:
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != launcher:  # it died before the line above
+        if os.getppid() != launcher:  # the launcher died before the previous line
             os._exit(1)
         if command.process:
             apply_settings(command.process)
-        if command.own:
+        if command.is_built_in:
             signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
 
     if command.process and command.process.emulate_tty:
@@ -272,8 +275,8 @@ def spawn(command: ChildCommand, pass_fds: tuple[int, ...]) -> subprocess.Popen[
         command.argv,
         bufsize=0,
         cwd=(
-            "/" if command.own and not command.folder.is_dir() else command.folder
-        ),  # ours need none
+            "/" if command.is_built_in and not command.folder.is_dir() else command.folder
+        ),  # tfcompose's processes need no folder
         env=command.env,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
@@ -290,7 +293,7 @@ def _on_terminals(
     """Start the command with pseudo-terminals for output and errors.
 
     Raises:
-        OSError: if it cannot be started.
+        OSError: if the command cannot be started.
     """
     with output_pairs(os.openpty) as ((out, its_out), (err, its_err)):
         for fd in (out, err):
@@ -314,13 +317,13 @@ def _on_terminals(
 def output_pairs(
     open_pair: Callable[[], tuple[int, int]],
 ) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """Open a pair of descriptors for a child's output and another for its errors.
+    """Open a pair of descriptors for a child's output and another pair for its errors.
 
-    In each pair the launcher's end is first. After the block the child's ends are closed, and the
-    launcher's too if the block failed.
+    In each pair the launcher's end is first. After the block, the child's ends are closed. If the
+    block failed, the launcher's ends are closed, too.
 
     Raises:
-        OSError: if a pair cannot be opened; the other is closed.
+        OSError: if a pair cannot be opened. An already open pair is closed.
     """
     with contextlib.ExitStack() as child_ends, contextlib.ExitStack() as launcher_ends:
 
@@ -337,7 +340,7 @@ def output_pairs(
 def has_ended(pid: int) -> bool:
     """Return whether the child has ended.
 
-    It stays a zombie, so that the kernel does not reuse its group id.
+    The child stays a zombie, so that the kernel does not reuse its group id.
     """
     return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
@@ -350,7 +353,7 @@ def kill_group(pid: int, number: int) -> None:
 
 @contextlib.contextmanager
 def subreaper() -> Iterator[None]:
-    """Adopt orphaned descendants instead of init during the block."""
+    """Adopt orphaned descendants, instead of init, during the block."""
     _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
     try:
         yield
@@ -359,16 +362,19 @@ def subreaper() -> Iterator[None]:
 
 
 def end_with(parent: int, number: signal.Signals) -> None:
-    """Have the kernel send this process the signal when its parent dies, at once if it is dead."""
+    """Have the kernel send this process the signal when its parent dies.
+
+    If the parent is already dead, send the signal at once.
+    """
     _LIBC.prctl(_PR_SET_PDEATHSIG, number)
     if os.getppid() != parent:
         os.kill(os.getpid(), number)
 
 
-def reap_adopted(known: Collection[int]) -> None:
-    """Reap ended children that are not in ``known``: orphans adopted by this process."""
+def reap_adopted(pids: Collection[int]) -> None:
+    """Reap ended children that are not in ``pids``: orphans that this process has adopted."""
     with contextlib.suppress(ChildProcessError):
-        while found := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
-            if found.si_pid in known:
+        while ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+            if ended.si_pid in pids:
                 return
-            os.waitpid(found.si_pid, 0)
+            os.waitpid(ended.si_pid, 0)

@@ -54,16 +54,17 @@ if TYPE_CHECKING:
     from tfcompose.launcher.child import ChildCommand, Running
     from tfcompose.launcher.events import Event
     from tfcompose.launcher.forking import Forker
-    from tfcompose.model.messages import GuardOrder, Notice, Stream
+    from tfcompose.model.messages import GuardOrder, Notice, Reread, Stream
     from tfcompose.model.plan import PlanProcess
 
-#: Maximum length of a line's beginning that is compared with a gate's pattern, in characters.
+#: Number of characters of a line that are matched against a log pattern.
 LONGEST_MATCHED = 4000
-#: Time limit of one comparison in the launcher, in seconds.
+#: Time limit of a match, in seconds.
 MATCHED_WITHIN_S = 0.1
-#: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
+#: Maximum length of a guard's line, in bytes. It may contain findings with notes, so it may be
+#: longer than a log line.
 EVENT_LIMIT = 1024 * 1024
-#: Processes that are held have this long to leave ROS before they are killed, in seconds.
+#: Time for held processes to leave ROS before they are killed, in seconds.
 LEAVE_S = 0.5
 _LEAVE_CHECK_S = 0.005
 
@@ -71,10 +72,10 @@ _LEAVE_CHECK_S = 0.005
 class Children:
     """The running processes.
 
-    ``happened`` receives their events and ``notify`` their output. ``writer`` maps a process and
-    one of its lines to the process that wrote it: a container also writes the lines of its
-    components. With a run id, this process also reaps and ends the orphans that they leave behind.
-    ``forker`` forks the commands that it can; all others are executed.
+    ``happened`` receives their events, and ``notify`` their output. ``writer`` maps a process and
+    a line of its output to the process that wrote the line, because a container also writes the
+    lines of its components. If there is a run id, this class also ends and reaps orphans of the
+    processes. ``forker`` forks the commands that it can. All other commands are executed.
     """
 
     def __init__(  # noqa: PLR0913, PLR0917 (made in one place)
@@ -94,6 +95,8 @@ class Children:
         self._notify = notify
         self._children: dict[str, Child] = {}
         self._held: dict[str, int] = {}
+        #: The launcher's ends of the pipes for orders to ``static``.
+        self._orders: dict[str, int] = {}
         self._guard = ""
         self._guard_pipes: GuardPipes | None = None
         self._marks = {RUN_ID: run_id, LAUNCHER: launcher_mark()} if run_id else {}
@@ -105,7 +108,7 @@ class Children:
     def start(
         self, process: PlanProcess, command: ChildCommand, guard: GuardPipes | None = None
     ) -> Event:
-        """Start the process, with pipes if it is a guard; return the resulting event."""
+        """Start the process and return the resulting event; ``guard`` has the pipes of a guard."""
         if process.name in self._held:
             return self._let_go(process.name)
         try:
@@ -113,7 +116,7 @@ class Children:
                 return StartFailed(process.name, command.missing)
             if (
                 process.name in self._ran and self._run_id
-            ):  # nobody wants two of what it left behind
+            ):  # leftovers of its previous run would run twice
                 signal_leftovers(self._run_id, {process.name}, signal.SIGKILL)
             self._left.discard(process.name)
             child = self._spawn(process, command, guard)
@@ -134,9 +137,9 @@ class Children:
         return Started(process.name, child.popen.pid)
 
     def prepare(self, process: PlanProcess, command: ChildCommand) -> None:
-        """Let one of tfcompose's own processes join ROS; it publishes once it is started.
+        """Let a process of tfcompose join ROS early. It publishes only after ``start``.
 
-        If that fails, its start says why.
+        If this fails, ``start`` reports the reason.
         """
         try:
             theirs, ours = os.pipe()
@@ -156,10 +159,10 @@ class Children:
             os.close(theirs)
 
     def dismiss(self) -> None:
-        """End the held processes, which will not be started, or not in this way.
+        """End the held processes, which will not start or will start differently.
 
-        Each leaves ROS when its pipe closes. A killed process stays in the node lists of others
-        until its DDS lease expires.
+        Each process leaves ROS when its pipe closes. If it were killed instead, other nodes would
+        list its node until its DDS lease expires.
         """
         dismissed = [self._children.pop(name) for name in self._held]
         while self._held:
@@ -175,32 +178,37 @@ class Children:
             self._update_reaper()
 
     def kill(self, name: str, number: int) -> None:
-        """Send the signal to the child's group, if it runs."""
+        """Send the signal to the child's group, if the child runs."""
         if name in self._children:
             self._left.add(name)
             kill_group(self._children[name].popen.pid, number)
 
     def order(self, order: GuardOrder) -> None:
-        """Send the guard an order, if it runs."""
+        """Send an order to the guard, if the guard runs."""
         if self._guard_pipes:
             self._guard_pipes.order(order)
 
+    def order_process(self, name: str, order: Reread) -> None:
+        """Send an order to a process of kind ``static``, if it runs."""
+        if name in self._orders:
+            with contextlib.suppress(OSError):
+                os.write(self._orders[name], line_of(order))
+
     def last_lines(self, name: str) -> tuple[str, ...]:
-        """Return the last lines of the process's output; none if it does not run."""
+        """Return the last lines of the process's output; empty if the process does not run."""
         return self._children[name].last_lines if name in self._children else ()
 
     def reap(self) -> None:
-        """Reap the children that have ended."""
+        """Reap children that have ended."""
         for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
-            # The guard's end dismisses those that are held, so that one of these may be gone by
-            # now.
+            # The guard's end dismisses held processes, so this process may already be gone.
             if child.name not in self._held and self._children.get(child.name) is child:
                 self._take_leavings(child)
         if self._run_id:
             reap_adopted(self._groups() | {self._reaper.pid})
 
     def find_strays(self) -> None:
-        """Record the groups of this process's descendants, and pass them to the reaper."""
+        """Record the groups of this process's descendants, and pass the groups to the reaper."""
         if not self._run_id:
             return
         if self._reaper.ended:
@@ -213,7 +221,7 @@ class Children:
         self._update_reaper()
 
     def close(self) -> None:
-        """Kill the remaining children: some remain only if an error in the launcher ends it."""
+        """Kill the remaining children. Children remain only after an error in the launcher."""
         self.dismiss()
         for child in self._children.values():
             self._end(child)
@@ -221,22 +229,23 @@ class Children:
         self._close_guard_pipes()
         if self._run_id:
             marked = leftovers(self._run_id)
-            others = self._descendants().keys() - {child.pid for child in marked}
-            end(marked + leftovers_of(others, self._run_id), 1.0)
+            unmarked = self._descendants().keys() - {child.pid for child in marked}
+            end(marked + leftovers_of(unmarked, self._run_id), 1.0)
         self._strays.clear()
         self._update_reaper()
         self._reaper.close()
 
-    # A process's life.
+    # Lifecycle of a process.
 
     def _let_go(self, name: str) -> Event:
         with io.FileIO(self._held.pop(name), "wb") as hold, contextlib.suppress(BrokenPipeError):
-            hold.write(GO)  # one that has ended meanwhile is seen to have ended
+            hold.write(GO)  # if it has ended, ``reap`` detects that
         return Started(name, self._children[name].popen.pid)
 
     def _end(self, child: Child) -> None:
         kill_group(child.popen.pid, signal.SIGKILL)
         child.popen.wait()
+        self._close_orders(child.name)
         for pipe in child.pipes:
             self._selector.unregister(pipe.file)
             pipe.file.close()
@@ -257,13 +266,15 @@ class Children:
         if command.fence:
             command.fence[0].parent.mkdir(exist_ok=True)
             command.fence[0].write_text(command.fence[1], encoding="utf-8")
-        marked = replace(command, env=command.env | more)
         passed = guard.theirs if guard else pass_fds
-        popen: Running
-        if self._forker and self._forker.can_start(marked):
-            popen = self._forker.start(marked, passed)
-        else:
-            popen = spawn(marked, passed)
+        with contextlib.ExitStack() as started, contextlib.ExitStack() as failed:
+            if process.kind == "static":
+                theirs = self._open_orders(process.name)
+                started.callback(os.close, theirs)
+                failed.callback(self._close_orders, process.name)
+                passed, more = (*passed, theirs), more | {ORDERS_FD: str(theirs)}
+            popen = self._start_program(replace(command, env=command.env | more), passed)
+            failed.pop_all()
         child = Child(process.name, popen)
         self._children[process.name] = child
         self._update_reaper()
@@ -276,6 +287,27 @@ class Children:
                 child, Pipe(popen.stderr, self._logger(child, "stderr", gate), bucket=child.bucket)
             )
         return child
+
+    def _start_program(self, command: ChildCommand, passed: tuple[int, ...]) -> Running:
+        if self._forker and self._forker.can_start(command):
+            return self._forker.start(command, passed)
+        return spawn(command, passed)
+
+    def _open_orders(self, name: str) -> int:
+        """Open the pipe for orders to a process, and return its end.
+
+        Raises:
+            OSError: if it cannot be opened.
+        """
+        theirs, ours = os.pipe()
+        os.set_blocking(ours, False)
+        self._close_orders(name)
+        self._orders[name] = ours
+        return theirs
+
+    def _close_orders(self, name: str) -> None:
+        if name in self._orders:
+            os.close(self._orders.pop(name))
 
     def _watch(self, child: Child, pipe: Pipe) -> None:
         child.pipes.append(pipe)
@@ -325,12 +357,16 @@ class Children:
             self._happened(event)
 
     def _take_leavings(self, child: Child) -> None:
-        """Collect what an ended process leaves: the rest of its group, last output, exit code."""
+        """Handle an ended process.
+
+        Kill the rest of its group, read its last output and exit code.
+        """
         kill_group(child.popen.pid, signal.SIGKILL)
         for pipe in list(child.pipes):
             self._drain(child, pipe)
         returncode = child.popen.wait()
         del self._children[child.name]
+        self._close_orders(child.name)
         if child.name == self._guard:
             self._close_guard_pipes()
         self._update_reaper()
@@ -345,7 +381,7 @@ class Children:
         self._reaper.watch(self._groups() | self._strays)
 
     def _groups(self) -> set[int]:
-        """Return the groups of the children; each child leads its own."""
+        """Return the process groups of the children. Each child leads its own group."""
         return {child.popen.pid for child in self._children.values()}
 
     def _descendants(self) -> dict[int, int]:
@@ -353,10 +389,11 @@ class Children:
 
 
 def _matcher(pattern: str) -> Callable[[str], bool]:
-    """Return a function that tells whether a line contains the pattern.
+    """Return a function that returns whether a line contains the pattern.
 
-    It raises TimeoutError if the match takes too long: ``(a|aa)+$`` takes time exponential in the
-    length of the line, and ``re`` cannot be interrupted.
+    The function raises TimeoutError if the match takes too long. For example, ``(a|aa)+$`` takes
+    time exponential in the length of the line. Unlike ``re``, the library ``regex`` has a time
+    limit.
     """
     compiled = regex.compile(pattern)
     return lambda line: compiled.search(line, timeout=MATCHED_WITHIN_S) is not None
@@ -369,9 +406,9 @@ def _reason(error: Exception) -> str:
 
 
 class GuardPipes:
-    """The launcher's ends of the guard's pipes, for its events and for orders to it.
+    """The launcher's ends of the guard's pipes: for events from the guard and orders to it.
 
-    ``theirs`` are the guard's ends. The launcher closes its copies once the guard has started.
+    ``theirs`` are the guard's ends. The launcher closes its copies after the guard has started.
     """
 
     def __init__(self, *, joins: bool, memory: dict[str, Any]) -> None:
@@ -409,16 +446,16 @@ class GuardPipes:
             os.close(fd)
 
     def order(self, order: GuardOrder) -> None:
-        """Send the guard an order; drop it if the guard does not read."""
+        """Send an order to the guard. Drop the order if the guard does not read."""
         with contextlib.suppress(OSError):
             os.write(self._orders, line_of(order))
 
     def close(self) -> None:
-        """Close the end for orders; the reader of events closes the other."""
+        """Close the pipe for orders. The reader of events closes the other pipe."""
         os.close(self._orders)
 
 
-#: Script of the reaper: it reads process groups until the launcher is gone.
+#: Shell script of the reaper. It reads process groups until the launcher is gone.
 _SCRIPT = """
 groups='' last=''
 while read -r line; do groups=$line; last=$line; done
@@ -432,17 +469,17 @@ done
 
 
 def _ignore_signals() -> None:
-    """Ignore the ending signals from the start; the shell's children inherit that."""
+    """Ignore the ending signals. Children of the shell inherit this."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 class Reaper:
-    """Ends a run whose launcher was killed: a shell that outlives the launcher briefly.
+    """Ends a run whose launcher was killed: a shell process that briefly outlives the launcher.
 
-    It kills the groups last passed to ``watch``, those of all the launcher's descendants. Then it
-    kills every process with the run id in its environment, to catch those that left their groups
-    since.
+    It kills the groups that ``watch`` last set, which are the groups of all the launcher's
+    descendants. Then it kills every process with the run id in its environment, because a process
+    may have left its group since then.
     """
 
     def __init__(self, run_id: str = "") -> None:
@@ -459,21 +496,21 @@ class Reaper:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """The process id of the shell."""
         return self._shell.pid
 
     @property
     def returncode(self) -> int | None:
-        """Its exit code; None while it runs."""
+        """The shell's exit code, None while it runs."""
         return self._shell.poll()
 
     @property
     def ended(self) -> bool:
-        """Whether something else killed it."""
+        """Whether another process killed the shell."""
         return self.returncode is not None
 
     def watch(self, groups: Iterable[int]) -> None:
-        """Set the groups to kill."""
+        """Set the process groups to kill."""
         watched = " ".join(map(str, sorted(groups)))
         if self._shell.stdin and watched != self._watched:
             self._watched = watched
@@ -481,7 +518,7 @@ class Reaper:
                 self._shell.stdin.write(f"{watched}\n".encode())
 
     def close(self) -> None:
-        """Let it end; it kills the groups it was last given."""
+        """End the shell. It kills the groups that were last set."""
         if self._shell.stdin:
             if not self._watched:
                 with contextlib.suppress(BrokenPipeError):

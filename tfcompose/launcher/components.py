@@ -1,8 +1,8 @@
-"""Lifecycle of components: nodes that the guard has containers load and unload.
+"""Lifecycle of components: nodes that containers load and unload on request of the guard.
 
-A component has no process of its own in the operating system. An order to the guard starts it, it
-runs once its container has answered, and it ends with the container. After a restart, the guard
-gets the orders again.
+A component has no process in the operating system. It starts with an order to the guard, runs once
+its container has answered, and ends with the container. A restarted guard receives the orders
+again.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def take_component_answer(step: Transition, event: ComponentState) -> None:
 
 
 def _end_component(step: Transition, tracked: Tracked, why: str, message: str) -> None:
-    """Handle a component that was not loaded, or is gone: load it again, or let it fail."""
+    """Handle a component that is not loaded: load it again, or let it fail."""
     name = tracked.process.name
     if step.state.stop:
         step.enter(name, "stopped", why)
@@ -71,29 +71,30 @@ def _end_component(step: Transition, tracked: Tracked, why: str, message: str) -
 
 
 def order_components(step: Transition) -> None:
-    """Repeat to a guard that has just started the orders that the last one may not have finished.
+    """Repeat orders about components to a guard that has just started.
 
-    The absences come first, because the guard drops its orders about absent components.
+    The previous guard may not have finished them. Orders of type ``Absent`` come first, because
+    they make the guard drop other orders about these components.
     """
     for name, tracked in step.state.tracked.items():
         if tracked.process.component and tracked.state in (
             "starting",
             "running",
-        ):  # it watches over those that run
+        ):  # the guard also watches components that run
             step.actions.append(Order(ComponentOrder(name, tracked.order, "load", again=True)))
         elif tracked.process.component and tracked.state == "stopping":
             step.actions.append(Order(ComponentOrder(name, tracked.order, "unload")))
 
 
-#: Logger names: ROS writes them in brackets at the beginning of a line.
+#: A logger's name, which ROS writes in brackets at the start of a line.
 _LOGGER = re.compile(r"\[([\w.]+)\]")
 _BEGINNING = 300
 
 
 def writer_of(state: State, process: str, line: str) -> str:
-    """Return the process that a line belongs to.
+    """Return the process that wrote a line.
 
-    A line from a container belongs to the component whose logger it names.
+    A line from a container belongs to the component whose logger the line names.
     """
     components = state.components_of(process)
     if not components:
@@ -104,9 +105,9 @@ def writer_of(state: State, process: str, line: str) -> str:
         for node in component.process.nodes
     }
     for name in _LOGGER.findall(line[:_BEGINNING]):
-        found = next(
+        logger_name = next(
             (logger for logger in loggers if name == logger or name.startswith(f"{logger}.")), None
         )
-        if found:
-            return loggers[found]
+        if logger_name:
+            return loggers[logger_name]
     return process

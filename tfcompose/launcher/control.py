@@ -1,8 +1,8 @@
 """The control socket: other commands send requests to the launcher and receive its notices.
 
-A request is one line of JSON, as ``tfcompose.model.messages`` describes it, and so is its answer.
-A client that asks for events receives the recent ones first, then each new one. Only the user who
-runs the robot gets an answer.
+A request is a line of JSON, as defined in ``tfcompose.model.messages``, and so is its answer. A
+client that requests events receives the recent events first, then each new event. The launcher
+answers only the user who runs the robot.
 """
 
 from __future__ import annotations
@@ -29,17 +29,18 @@ if TYPE_CHECKING:
 
 A = TypeVar("A")
 
-#: A longer request is refused; a listener that is so far behind is let go; bytes.
+#: Maximum length of a request, and of unsent notices to a client, in bytes. A longer request is
+#: rejected. A client with more unsent notices is disconnected.
 LONGEST_REQUEST = 64 * 1024
 LONGEST_BACKLOG = 1024 * 1024
-#: Number of lines kept for clients that connect later.
+#: Number of notices kept for clients that connect later.
 KEPT_LINES = 500
 #: Maximum time for the launcher's answer, in seconds.
 ANSWER_S = 20.0
 
 
 class RequestRefusedError(Exception):
-    """Raised where the launcher refuses a request; the message is its reason."""
+    """The launcher rejects a request; the message is the reason."""
 
 
 @dataclass(slots=True, eq=False)
@@ -53,8 +54,8 @@ class Client:
 
 
 @contextlib.contextmanager
-def _at(runtime_dir: RuntimeDir) -> Iterator[str]:
-    """Give the socket's address, a short one because Linux allows only 107 bytes."""
+def _socket_address(runtime_dir: RuntimeDir) -> Iterator[str]:
+    """Yield a short address of the socket, because Linux limits it to 107 bytes."""
     folder = os.open(runtime_dir.folder, os.O_DIRECTORY | os.O_RDONLY)
     try:
         yield f"{procfs.descriptor(folder)}/{runtime_dir.socket.name}"
@@ -70,7 +71,7 @@ def listen(runtime_dir: RuntimeDir) -> socket.socket:
     with contextlib.suppress(FileNotFoundError):
         runtime_dir.socket.unlink()
     listener = socket.socket(socket.AF_UNIX)
-    with _at(runtime_dir) as address:
+    with _socket_address(runtime_dir) as address:
         before = os.umask(0o177)
         try:
             listener.bind(address)
@@ -82,16 +83,16 @@ def listen(runtime_dir: RuntimeDir) -> socket.socket:
 
 
 def connect(runtime_dir: RuntimeDir) -> socket.socket:
-    """Return a connection to the launcher of the robot.
+    """Return a connection to the robot's launcher.
 
     Raises:
-        OSError: if no launcher runs the robot, or it is suspended (Ctrl-Z) and cannot answer.
+        OSError: if no launcher runs the robot, or the launcher is suspended (Ctrl-Z).
     """
     _ensure_it_runs(runtime_dir)
     connection = socket.socket(socket.AF_UNIX)
     connection.settimeout(ANSWER_S)
     try:
-        with _at(runtime_dir) as address:
+        with _socket_address(runtime_dir) as address:
             connection.connect(address)
     except BaseException:
         connection.close()
@@ -100,7 +101,7 @@ def connect(runtime_dir: RuntimeDir) -> socket.socket:
 
 
 def _is_suspended(pid: int) -> bool:
-    """Return whether the process is suspended, as by Ctrl-Z."""
+    """Return whether the process is suspended, for example by Ctrl-Z."""
     try:
         return procfs.stat(pid).state == "T"
     except OSError:
@@ -118,11 +119,11 @@ def _ensure_it_runs(runtime_dir: RuntimeDir) -> None:
 
 
 def ask(runtime_dir: RuntimeDir, request: Request, answer: type[A]) -> A:
-    """Return the launcher's answer to one request, as an ``answer``.
+    """Return the launcher's answer to a request, as an ``answer``.
 
     Raises:
-        RefusedError: with the launcher's reason, if it refuses.
-        OSError: if no launcher runs the robot, or it does not answer.
+        RefusedError: with the launcher's reason, if the launcher rejects the request.
+        OSError: if no launcher runs the robot, or the launcher does not answer.
     """
     with connect(runtime_dir) as connection:
         connection.sendall(line_of(request))
@@ -142,7 +143,7 @@ def ask(runtime_dir: RuntimeDir, request: Request, answer: type[A]) -> A:
 
 
 class Control:
-    """The launcher's end. ``answer`` takes each request and returns the object to send."""
+    """The launcher's end of the socket. ``answer`` returns the answer to a request."""
 
     def __init__(
         self,
@@ -158,21 +159,21 @@ class Control:
         selector.register(listener, selectors.EVENT_READ, self._accept)
 
     def publish(self, line: str) -> None:
-        """Send a line to all listening clients, and keep it for later ones."""
+        """Send a line to all listening clients, and keep it for clients that connect later."""
         sent = f"{line}\n".encode()
         self._lines.append(sent)
         for client in [client for client in self._clients if client.listens]:
             self._send(client, sent)
 
     def listen(self, listener: socket.socket) -> None:
-        """Accept requests at another socket from now on; connected clients stay."""
+        """Accept requests at another socket from now on. Connected clients stay connected."""
         self._selector.unregister(self._listener)
         self._listener.close()
         self._listener = listener
         self._selector.register(listener, selectors.EVENT_READ, self._accept)
 
     def close(self) -> None:
-        """Send the rest, and close."""
+        """Send pending notices, and close the connections."""
         for client in list(self._clients):
             client.connection.settimeout(0.5)
             with contextlib.suppress(OSError):
@@ -244,9 +245,9 @@ class Control:
             self._leave(client)
             return
         del client.unsent[:sent]
-        wanted = selectors.EVENT_READ | (selectors.EVENT_WRITE if client.unsent else 0)
-        if self._selector.get_key(client.connection).events != wanted:
-            self._selector.modify(client.connection, wanted, lambda: self._serve(client))
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if client.unsent else 0)
+        if self._selector.get_key(client.connection).events != events:
+            self._selector.modify(client.connection, events, lambda: self._serve(client))
 
     def _leave(self, client: Client) -> None:
         if client in self._clients:

@@ -1,6 +1,6 @@
 """Events and actions of the process machine, as values.
 
-Reports from the guard and requests from other commands are events too;
+Reports from the guard and requests from other commands are also events.
 ``tfcompose.model.messages`` defines them.
 """
 
@@ -48,7 +48,7 @@ class Exited:
     name: str
     #: The exit code, or minus the number of the signal.
     returncode: int
-    #: The end of its log.
+    #: The last lines of its log.
     last_lines: tuple[str, ...] = ()
 
 
@@ -61,12 +61,12 @@ class Signalled:
 
 @dataclass(frozen=True, slots=True)
 class OutputLost:
-    """The reader of the launcher's output is gone."""
+    """The reader of the launcher's output has gone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """Only time has passed."""
+    """Time has passed, and nothing else has happened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class TimeUp:
 
 @dataclass(frozen=True, slots=True)
 class LogMatched:
-    """A process wrote the line that makes it ready."""
+    """A process wrote the log line that makes it ready."""
 
     process: str
     text: str
@@ -84,17 +84,22 @@ class LogMatched:
 
 @dataclass(frozen=True, slots=True)
 class NewPlan:
-    """Another plan applies from now on."""
+    """Another plan replaces the current plan."""
 
     plan: Plan
-    #: Processes that must restart for it.
+    #: Processes that must restart for the new plan.
     changed: frozenset[str]
     #: Removed fixed edges that listeners keep until they restart.
     held: tuple[str, ...] = ()
     #: The path of the plan.
     file: str = ""
-    #: Processes with a new robot description only, which the guard can give them while they run.
+    #: Processes for which only the robot description changed. The guard can pass it to them while
+    #: they run.
     described: frozenset[str] = frozenset()
+    #: Processes that read the plan again while they run.
+    followers: frozenset[str] = frozenset()
+    #: Fixed edges that are sent with another pose, without a restart.
+    moved: tuple[str, ...] = ()
 
 
 Event = (
@@ -149,16 +154,24 @@ class NotifyLate:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Send the guard an order; a request for a container is written to the order's file."""
+    """Send an order to the guard. A request for a container is written to the order's file."""
 
     order: GuardOrder
 
 
 @dataclass(frozen=True, slots=True)
+class Follow:
+    """Have one of tfcompose's own processes read the plan again while it runs."""
+
+    name: str
+    file: str
+
+
+@dataclass(frozen=True, slots=True)
 class Finish:
-    """Nothing runs any more: exit with this code."""
+    """No process runs any more; exit with this code."""
 
     exit_code: int
 
 
-Action = Start | Kill | Notify | NotifyLate | Order | Finish
+Action = Start | Kill | Notify | NotifyLate | Order | Follow | Finish

@@ -1,8 +1,8 @@
-"""One process of a plan, started as ``tfcompose up`` starts it: ``tfcompose exec PLAN_FILE NAME``.
+"""A process of a plan, started as ``tfcompose up`` starts it: ``tfcompose exec PLAN_FILE NAME``.
 
-This program becomes the process, so that a supervisor (systemd, a container) supervises the
-process itself. Exit codes: 1 something that it needs is missing, 2 the arguments or the plan are
-not usable.
+This program becomes the process, so that a supervisor, such as systemd or a container runtime,
+supervises the process itself. Exit codes: 1 if something that the process needs is missing, 2 if
+the arguments or the plan are invalid.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ def command_of(argv: Sequence[str], base: Mapping[str, str]) -> ChildCommand | i
         return _fail(
             f"{name} is a component, which the guard has {process.component.container} load", 2
         )
-    # The launcher's run identifies messages in a partition; a topic per process needs no run.
+    # A partition needs the launcher's run to identify messages. A topic for each process does not.
     plan = replace(plan, guard=replace(plan.guard, fence="remap"))
     commands, findings = commands_of(plan, [process], file, base, child_environment)
     if findings:
         return _fail("\n".join(map(_text, findings)), 1)
-    # No launcher holds the others back until the guard has looked: it takes every owner as the
-    # plan's.
+    # No launcher delays the other processes until the guard has observed the tree. So the guard
+    # accepts every owner as the plan's.
     joins = {JOINS: "1"} if process.kind == "guard" else {}
     return replace(commands[name], env=commands[name].env | joins)
 

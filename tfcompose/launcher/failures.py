@@ -1,4 +1,4 @@
-"""The launcher's own findings, and the wording of a process's end."""
+"""Findings of the launcher, and descriptions of a process's end."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import PlanEdge
 
 
-#: Maximum number of an owner's edges in a finding.
+#: Maximum number of edges of an owner that a finding lists.
 NAMED_AT_MOST = 12
 
 
 def signal_name(number: int) -> str:
-    """Return the signal's name: SIGSEGV."""
+    """Return the signal's name, such as SIGSEGV."""
     try:
         return signal.Signals(number).name
     except ValueError:
@@ -27,21 +27,21 @@ def signal_name(number: int) -> str:
 
 
 def describe_exit(returncode: int) -> str:
-    """Return an exit code, or minus a signal's number, in words: "exit code 3", "SIGSEGV"."""
+    """Return a description of an exit code or of minus a signal: "exit code 3", "SIGSEGV"."""
     return signal_name(-returncode) if returncode < 0 else f"exit code {returncode}"
 
 
 def ended_by_itself_finding(
     name: str, returncode: int, when: str, last_lines: tuple[str, ...]
 ) -> Finding:
-    """Return the finding for a process that should not have ended; ``when`` ends the sentence."""
+    """Return the finding for a process that ended unexpectedly; ``when`` ends the sentence."""
     verb = "was ended by" if returncode < 0 else "ended with"
     notes = [Note(f"{name}: {line}") for line in last_lines]
     return finding("TF808", f"{name} {verb} {describe_exit(returncode)}{when}", None, notes=notes)
 
 
 def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
-    """Return the finding for a guard that ended while the others run, and restarts."""
+    """Return the finding for a guard that ended while other processes run, and restarts."""
     verb = "was ended by" if event.returncode < 0 else "ended with"
     blind = "no edge of the plan reaches /tf" if strict else "no process watches the tree"
     message = f"{name} {verb} {describe_exit(event.returncode)}: {blind} until it is back"
@@ -62,11 +62,11 @@ def not_started_finding(name: str, why: str) -> Finding:
     return finding("TF808", f"{name} could not be started: {why}", None)
 
 
-def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
+def waits_in_vain(name: str, awaited: str, what: str, why: str) -> Finding:
     """Return the finding for a process that waits for something that cannot happen."""
     return finding(
         "TF808",
-        f"{name} is not started: it waits for {other} to be {what}, and {other} {why}",
+        f"{name} is not started: it waits for {awaited} to be {what}, and {awaited} {why}",
         None,
     )
 
@@ -83,12 +83,12 @@ def never_clear(name: str, seconds: float) -> Finding:
 
 
 def never_published_finding(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
-    """Return the finding for one owner's edges that were not published in time."""
+    """Return the finding for edges of an owner that were not published in time."""
     names = list_names((edge.name for edge in edges), NAMED_AT_MOST)
     name = owner.process.name
     if owner.state == "stopped" and owner.order == 0:
         waits = " and ".join(
-            f"{other} to be {what}" for other, what in owner.process.after.items()
+            f"{awaited} to be {what}" for awaited, what in owner.process.after.items()
         )
         why = f"was not started: it waits for {waits}" if waits else "was not started"
         return finding("TF811", f"no node published {names}: {name} {why}", None)

@@ -1,8 +1,8 @@
-"""Fast DDS profile files (XML), with partitions added for the writers or readers of topics.
+"""Fast DDS profile files (XML) with partitions for the writers or readers of topics.
 
-rmw_fastrtps uses the profile named like a topic for its writers and readers, and then nothing of
-the default profile. So a new profile copies the file's default profile, if there is one, and adds
-the partition.
+rmw_fastrtps uses the profile named like a topic for the topic's writers and readers. It then
+ignores the default profile. So a new profile copies the file's default profile, if there is one,
+and adds the partition.
 """
 
 from __future__ import annotations
@@ -18,29 +18,28 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-#: Element names of writers' and readers' profiles; the second name is that of older releases.
+#: Element names of profiles of writers and readers. Older releases use the second names.
 WRITERS, READERS = ("data_writer", "publisher"), ("data_reader", "subscriber")
 Kind = Literal["data_writer", "data_reader"]
 
-#: No profile file is longer, in bytes, or nested deeper.
+#: Maximum size of a profile file in bytes, and maximum depth of its elements.
 MOST_BYTES = 1 << 20
 DEEPEST = 100
 _EMPTY = b'<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles/></dds>'
 _PARTITIONS = "partitions"
-#: Fast DDS 2.11 and newer.
+#: A property of Fast DDS 2.11 and newer.
 _IGNORES_ITSELF = "fastdds.ignore_local_endpoints"
 
 
 def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partitions: str) -> str:
     """Return a profile file that puts readers or writers of topics into partitions.
 
-    The content of ``file`` stays, except for its comments. A process whose readers are moved is
-    the guard. It does not receive its own messages, because receiving them would cost as much as
-    sending them.
+    The content of ``file`` is kept, except for comments. A process whose readers are in partitions
+    is the guard. It ignores its own messages, because receiving them would cost as much as sending
+    them.
 
     Raises:
-        RosError: with the reason, if the file cannot be read, or already puts one of the topics
-            into a partition.
+        RosError: if the file cannot be read, or already puts one of the topics into a partition.
     """
     root = _read(file)
     profiles = root if root.tag == "profiles" else root.find("profiles")
@@ -49,13 +48,13 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
             raise RosError(f"it begins with <{root.tag}>, not with <dds>")
         profiles = ET.SubElement(root, "profiles")
     names = WRITERS if kind == "data_writer" else READERS
-    known = [element for element in root.iter() if element.tag in names]
+    elements = [element for element in root.iter() if element.tag in names]
     default = next(
-        (element for element in known if element.get("is_default_profile") == "true"), None
+        (element for element in elements if element.get("is_default_profile") == "true"), None
     )
     for topic in dict.fromkeys(topics):
         profile = next(
-            (element for element in known if element.get("profile_name") == topic), None
+            (element for element in elements if element.get("profile_name") == topic), None
         )
         if profile is None:
             profile = ET.Element(kind) if default is None else deepcopy(default)
@@ -72,7 +71,7 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
 
 
 def _ignore_own_writers(profiles: ET.Element) -> None:
-    """Keep the process's readers from matching its own writers."""
+    """Prevent the process's readers from matching its own writers."""
     participant = next(
         (
             element
@@ -101,8 +100,8 @@ def _add_property(entity: ET.Element, name: str, value: str) -> None:
 
 
 def _below(parent: ET.Element, name: str) -> ET.Element:
-    found = parent.find(name)
-    return ET.SubElement(parent, name) if found is None else found
+    element = parent.find(name)
+    return ET.SubElement(parent, name) if element is None else element
 
 
 def _read(file: Path | None) -> ET.Element:
@@ -124,11 +123,10 @@ def _read(file: Path | None) -> ET.Element:
 
 
 class _ProfileReader:
-    """Reads XML as Fast DDS does: it ignores XML namespaces.
+    """Reads XML as Fast DDS does, without XML namespaces.
 
     Raises:
-        ValueError: with one sentence, for a document type with its entities, or elements nested
-            too deep.
+        ValueError: with a sentence, for a document type or elements nested too deep.
         expat.ExpatError: if the text is not XML.
     """
 

@@ -1,10 +1,10 @@
-"""Isolation of a strict plan's processes: only the guard receives their TF.
+"""Isolation of the processes of a strict plan: only the guard receives their TF.
 
-If their rmw is Fast DDS, a profile file moves their writers into a DDS partition. Otherwise, or if
-the plan says so, their TF topics are remapped to separate topics. That moves their listeners too,
-and the guard feeds the rest of the tree back to them. A remapping reaches every process that takes
-ROS arguments: executables of packages, launch files, tfcompose's own processes, and commands that
-own an edge.
+If their middleware is Fast DDS, a profile file moves their writers into a DDS partition.
+Otherwise, or if the plan requires it, their TF topics are remapped to separate topics. This also
+moves their listeners, so the guard sends the rest of the tree to these topics. A remapping applies
+to every process that takes ROS arguments: executables of packages, launch files, tfcompose's own
+processes, and commands that own an edge.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ if TYPE_CHECKING:
     Way = Literal["", "partition", "remap"]
 
 
-#: A command sets or clears the profile file by itself.
+#: Matches a command that sets or clears the profile file itself.
 _LEAVES = re.compile(rf"\b({'|'.join(PROFILE_VARIABLES)})\b(=(?P<file>[^\s;&|]*))?")
 
 
 def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
-    """Return how the plan's processes are isolated; empty: they are not.
+    """Return how the plan's processes are isolated; empty if they are not isolated.
 
-    ``base`` is their common environment.
+    ``base`` is the common environment of the processes.
     """
     if plan.guard.mode != "strict":
         return ""
@@ -59,12 +59,12 @@ def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
 
 
 def remap_tf(plan: Plan, process: PlanProcess) -> PlanProcess:
-    """Return the process with its TF remapped to its own topics, under any name it uses for them.
+    """Return the process with its TF topics remapped to separate topics, under any name.
 
-    ROS applies the first matching remapping, so these come first.
+    ROS applies the first matching remapping, so these remappings come first.
     """
     private = private_topics(plan).get(process.name)
-    if private is None or process.component:  # what its container is asked says it
+    if private is None or process.component:  # the request to its container contains the remapping
         return process
     rules = dict([*zip(GLOBAL, private, strict=True), *zip(process.topics, private, strict=True)])
     if process.argv[0].startswith("${launch:"):
@@ -73,14 +73,14 @@ def remap_tf(plan: Plan, process: PlanProcess) -> PlanProcess:
             remap=rules | {old: new for old, new in process.remap.items() if old not in rules},
         )
     arguments = [argument for old, new in rules.items() for argument in ("-r", f"{old}:={new}")]
-    at = process.argv.index("--ros-args") if "--ros-args" in process.argv else len(process.argv)
+    end = process.argv.index("--ros-args") if "--ros-args" in process.argv else len(process.argv)
     return replace(
-        process, argv=(*process.argv[:at], "--ros-args", *arguments, *process.argv[at + 1 :])
+        process, argv=(*process.argv[:end], "--ros-args", *arguments, *process.argv[end + 1 :])
     )
 
 
 def find_not_remapped(plan: Plan) -> list[Finding]:
-    """Return a finding for owners that no remapping reaches."""
+    """Return a finding for owners that ignore remappings."""
     missed = [
         process.name
         for process in plan.processes
@@ -102,14 +102,14 @@ def find_not_remapped(plan: Plan) -> list[Finding]:
 def by_partition(
     plan: Plan, commands: Mapping[str, ChildCommand], folder: Path
 ) -> tuple[dict[str, ChildCommand], list[Finding]]:
-    """Return the commands with profiles that partition their TF, and findings for failures."""
+    """Return the commands with profiles that isolate their TF, and findings about failures."""
     judged = judged_topics(plan)
     fenced: dict[str, ChildCommand] = {}
     wrong: dict[tuple[str, str], list[str]] = {}
     for name, command in commands.items():
         process = plan.process(name)
         if process.component:
-            continue  # its writers are its container's
+            continue  # its container has the profile
         reads = process.kind == "guard"
         topics = [
             topic
@@ -134,7 +134,7 @@ def by_partition(
 
 
 class _CannotFenceError(Exception):
-    """Raised if a partition cannot isolate a process; has the reason and the way out."""
+    """A partition cannot isolate a process; has the reason and a way out."""
 
     def __init__(self, message: str, advice: str) -> None:
         super().__init__(message)
@@ -164,7 +164,7 @@ def _profile(plan: Plan, command: ChildCommand, topics: list[str], *, reads: boo
 
 
 def _refuse_own_profile(process: PlanProcess, command: ChildCommand) -> None:
-    """Refuse an owner whose command sets another profile file itself, and so would bypass ours."""
+    """Reject an owner whose command sets another profile file and so bypasses the partition."""
     match = next(filter(None, map(_LEAVES.search, command.argv)), None) if process.owns else None
     if match is None:
         return

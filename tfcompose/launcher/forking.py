@@ -1,10 +1,10 @@
-"""Own processes forked from the launcher, which has imported their modules but called nothing.
+"""Processes of tfcompose forked from the launcher, which has imported their modules.
 
-Importing ROS takes 0.2 s of CPU and 30 MB. A forked process shares the launcher's pages, is its
-child like any other, and looks like a separate program: /proc shows the command line and
-environment that an exec would have given it, because a run recognises its processes by these. ROS
-can be forked as long as it is not initialised and no thread runs except those of LTTng, which
-handles forks.
+Importing ROS takes 0.2 s of CPU time and 30 MB. A forked process shares the launcher's memory
+pages. It is the launcher's child and looks like a separate program: /proc shows the command line
+and the environment that an exec would have set, because a run recognises its processes by these. A
+process that has imported ROS can be forked if ROS is not initialised. No thread may run except the
+threads of LTTng, which supports forks.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from tfcompose.launcher.child import ChildCommand
 
-#: Variables that nothing reads before a process initialises ROS, by how they begin.
+#: Prefixes of variables that no library reads before a process initialises ROS.
 _READ_LATE = ("ROS_", "TFCOMPOSE_", "FASTRTPS_DEFAULT_", "FASTDDS_DEFAULT_", "PYTHONUNBUFFERED")
 _LIBC = ctypes.CDLL(None, use_errno=True)
 _LIBC.sbrk.restype = ctypes.c_void_p
@@ -42,18 +42,19 @@ _PR_SET_NAME = 15
 _PR_SET_MM, _PR_SET_MM_MAP = 35, 14
 _NO_FILE = 0xFFFFFFFF
 _STDERR = 2
-#: LTTng's library; a wheel puts a hash into its name.
+#: LTTng's library. A Python wheel adds a hash to its name.
 _LTTNG = re.compile(r"/liblttng-ust(-[0-9a-f]{8})?\.so")
-#: sigset_t, in bytes.
+#: Size of sigset_t, in bytes.
 _SIGSET_SIZE = 128
-#: mallopt(3): a thread's own part of memory starts empty, and DDS has ten threads.
+#: mallopt(3): limits the number of arenas. Each thread could have its own, initially empty arena,
+#: and DDS has ten threads.
 _M_ARENA_MAX, _ARENAS = -8, 2
-#: Mappings of the command line and the environment that /proc shows; never released.
-_shown: list[mmap.mmap] = []
+#: Memory with the command line and the environment that /proc shows; never released.
+_regions: list[mmap.mmap] = []
 
 
 class ForkedProcess:
-    """A forked child, with the part of ``subprocess.Popen`` that a launcher needs."""
+    """A forked child, with the methods of ``subprocess.Popen`` that the launcher uses."""
 
     def __init__(self, pid: int, stdout: int, stderr: int) -> None:
         self.pid = pid
@@ -61,17 +62,17 @@ class ForkedProcess:
         self.stderr = io.FileIO(stderr)
 
     def wait(self) -> int:
-        """Wait for its end; return its exit code, or minus the number of the signal."""
+        """Wait for the process to end. Return its exit code, or minus the number of the signal."""
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
 class Forker:
-    """Forks own processes from this one. Create it before the process joins ROS."""
+    """Forks tfcompose's processes from this process. Create it before this process joins ROS."""
 
     def __init__(self, load: Callable[[], None], run: Callable[[], int]) -> None:
         """Call ``load``, which imports the shared modules.
 
-        A forked process calls ``run``, with its command in ``sys.argv``; ``run`` returns the exit
+        A forked process calls ``run`` with its command in ``sys.argv``. ``run`` returns the exit
         code.
         """
         load()
@@ -80,26 +81,26 @@ class Forker:
         self._threads = procfs.threads()
         self._tracing = Tracing()
         gc.collect()
-        gc.freeze()  # what a collection touches is shared no longer
+        gc.freeze()  # a garbage collection would copy shared pages
 
     def can_start(self, command: ChildCommand) -> bool:
         """Return whether a fork of this process can become the command.
 
-        A fork keeps the interpreter, and what the interpreter read from the environment at its
-        start. Settings that apply from the first instruction need a new program.
+        A fork keeps the interpreter and the environment that it read at its start. A command with
+        other such settings needs a new program.
         """
         process = command.process
         plain = process is None or not (process.emulate_tty or has_settings(process))
         return (
             plain
-            and command.own
+            and command.is_built_in
             and command.argv[: len(HERE)] == HERE
             and not _differs_early(self._env, command.env)
             and procfs.threads() <= self._threads
         )
 
     def start(self, command: ChildCommand, pass_fds: tuple[int, ...]) -> ForkedProcess:
-        """Fork the command's process, as ``child.spawn`` starts others.
+        """Fork the process of the command, as ``child.spawn`` starts other processes.
 
         Raises:
             OSError: if it cannot be forked.
@@ -124,10 +125,10 @@ class Forker:
         pass_fds: tuple[int, ...],
         mask: Collection[int],
     ) -> NoReturn:
-        """Become the command's process, and exit with it.
+        """Become the command's process, and exit with its exit code.
 
-        The launcher's objects stay alive: collecting one here would close a descriptor number that
-        something else may use by now.
+        The launcher's objects stay alive. If one were collected here, it could close a descriptor
+        number that is now in use for something else.
         """
         code = 1
         try:
@@ -156,7 +157,10 @@ class Forker:
 
 
 class Tracing:
-    """LTTng's part of a fork, if ROS is built with it: its threads restart in the child."""
+    """LTTng's functions around a fork, if ROS is built with LTTng.
+
+    Its threads restart in the child.
+    """
 
     def __init__(self) -> None:
         self._signals = ctypes.create_string_buffer(_SIGSET_SIZE)
@@ -166,7 +170,7 @@ class Tracing:
                 with suppress(OSError):
                     self._library = ctypes.CDLL(file, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
         if self._library:
-            # Its names since version 2.13, and before.
+            # The first prefix is that of version 2.13 and newer.
             named = hasattr(self._library, "lttng_ust_before_fork")
             self._prefix = "lttng_ust_" if named else "ust_"
 
@@ -186,13 +190,13 @@ class Tracing:
 
 
 def _differs_early(ours: Mapping[str, str], theirs: Mapping[str, str]) -> bool:
-    """Return whether the environments differ in variables read before ROS is initialised."""
+    """Return whether variables differ that are read before ROS is initialised."""
     differing = {name for name, _ in ours.items() ^ theirs.items()}
     return not all(name.startswith(_READ_LATE) for name in differing)
 
 
 def _leave(launcher: int, output: tuple[int, int], pass_fds: tuple[int, ...]) -> None:
-    """Drop what belongs to the launcher: its session, handlers, descriptors and output."""
+    """Drop the launcher's session, signal handlers, descriptors and output."""
     os.setsid()
     end_with(launcher, signal.SIGKILL)
     signal.set_wakeup_fd(-1)
@@ -202,7 +206,7 @@ def _leave(launcher: int, output: tuple[int, int], pass_fds: tuple[int, ...]) ->
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     nothing = os.open(os.devnull, os.O_RDONLY)
-    # First out of the way: a launcher without output of its own has pipes there.
+    # First move them away from 0 to 2, which may be pipes of a launcher without output.
     standard = [fcntl.fcntl(fd, fcntl.F_DUPFD, _STDERR + 1) for fd in (nothing, *output)]
     for number, fd in enumerate(standard):
         os.dup2(fd, number)
@@ -237,18 +241,18 @@ class _MemoryMap(ctypes.Structure):
 
 
 def show_as(argv: Collection[str], env: Mapping[str, str]) -> bool:
-    """Have /proc show this command line and environment of this process, as after an exec.
+    """Make /proc show this command line and environment for this process, as after an exec.
 
-    Return whether the kernel supports that. It needs no privileges, only
-    CONFIG_CHECKPOINT_RESTORE, which distributions' kernels enable.
+    Return whether the kernel supports this. It requires no privileges, only
+    CONFIG_CHECKPOINT_RESTORE, which distributions enable in their kernels.
     """
     arguments = b"".join(os.fsencode(argument) + b"\0" for argument in argv)
     variables = b"".join(os.fsencode(f"{name}={value}") + b"\0" for name, value in env.items())
-    shown = mmap.mmap(
+    region = mmap.mmap(
         -1, len(arguments) + len(variables) + 1, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
-    )  # /proc shows anonymous pages alone
-    shown.write(arguments + variables)
-    begin = ctypes.addressof(ctypes.c_char.from_buffer(shown))
+    )  # /proc shows only anonymous pages
+    region.write(arguments + variables)
+    begin = ctypes.addressof(ctypes.c_char.from_buffer(region))
     between, end = begin + len(arguments), begin + len(arguments) + len(variables)
     parts = dict(
         zip(
@@ -263,6 +267,6 @@ def show_as(argv: Collection[str], env: Mapping[str, str]) -> bool:
     memory.brk = _LIBC.sbrk(0)
     if _LIBC.prctl(_PR_SET_MM, _PR_SET_MM_MAP, where, size, done) != 0:
         return False
-    _shown.append(shown)
+    _regions.append(region)
     _LIBC.prctl(_PR_SET_NAME, os.path.basename(os.fsencode(sys.executable)), 0, 0, 0)  # noqa: PTH119 (bytes)
     return True

@@ -1,7 +1,7 @@
-"""Kernel settings of a process: applied before its program starts, and checked beforehand.
+"""Kernel settings of a process, applied before its program starts and checked beforehand.
 
-A setting is a row of ``SETTINGS``: the process's key, a function that applies it to the calling
-process, and one that checks it without changing this process.
+A setting is a row of ``SETTINGS``. It has the process's key, a function that applies the setting
+to the calling process, and a function that checks it without changing the calling process.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class KernelSetting:
-    """A key of a process that the kernel enforces."""
+    """A key of a process whose value the kernel enforces."""
 
     key: str
-    #: Applies a value to this process and the programs it starts. Raises OSError or ValueError if
-    #: the kernel refuses it.
+    #: Applies a value to this process and the programs that it starts. Raises OSError or
+    #: ValueError if the kernel rejects the value.
     apply: Callable[[Any], None]
-    #: Returns the finding for a value that the kernel would refuse, given the process's name and
+    #: Takes the name of the process and a value. Returns the finding if the kernel would reject
     #: the value.
     refusal: Callable[[str, Any], Finding | None]
 
 
 def apply_settings(process: PlanProcess) -> None:
-    """Apply the plan's kernel settings to this process and the programs it starts.
+    """Apply the plan's kernel settings to this process and the programs that it starts.
 
     Raises:
-        OSError: if the kernel refuses one.
-        ValueError: if it refuses a limit.
+        OSError: if the kernel rejects a setting.
+        ValueError: if the kernel rejects a limit.
     """
     for setting, value in _set(process):
         setting.apply(value)
 
 
 def check_settings(process: PlanProcess) -> list[Finding]:
-    """Return findings for the settings that the kernel would refuse; this process is unchanged."""
+    """Return findings for settings that the kernel would reject. This process is unchanged."""
     refusals = [setting.refusal(process.name, value) for setting, value in _set(process)]
     return [refusal for refusal in refusals if refusal]
 
@@ -84,7 +84,7 @@ def _apply_schedule(schedule: Schedule) -> None:
 
 
 def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
-    """Return the finding for a refused schedule, tried on a short-lived thread."""
+    """Return the finding for a rejected schedule. A short-lived thread tries the schedule."""
     try:
         with ThreadPoolExecutor(1) as thread:
             lacking = set(schedule.cpus) - thread.submit(_cpus_with, schedule).result()
@@ -107,12 +107,12 @@ def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
 
 
 def _cpus_with(schedule: Schedule) -> set[int]:
-    """Apply the schedule to this thread for good, and return its processors."""
+    """Apply the schedule to this thread permanently, and return the thread's CPUs."""
     _apply_schedule(schedule)
     return os.sched_getaffinity(0)
 
 
-# Order of killing when memory runs out.
+# Order in which the kernel kills processes when memory runs out.
 
 _SCORE = Path(OOM_SCORE)
 
@@ -122,7 +122,10 @@ def _apply_score(score: int) -> None:
 
 
 def _score_refusal(name: str, score: int) -> Finding | None:
-    """Return the finding for a refused score: one below the lowest since a privileged start."""
+    """Return the finding for a rejected score.
+
+    The kernel rejects a score below the lowest score since a privileged start.
+    """
     before = int(_SCORE.read_text(encoding="utf-8"))
     if score >= before:
         return None
@@ -144,7 +147,7 @@ def _apply_open_files(count: int) -> None:
 
 
 def _open_files_refusal(name: str, count: int) -> Finding | None:
-    """Return the finding for a refused limit: above the hard limit, or above the kernel's."""
+    """Return the finding for a rejected limit: above the hard limit or the kernel's limit."""
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     if count <= before[1]:
         return None

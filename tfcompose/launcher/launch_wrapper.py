@@ -1,7 +1,8 @@
-"""Launch file for ``ros2 launch``: the user's, with the plan's settings for all its nodes.
+"""Launch file for ``ros2 launch``: includes the user's file, with the plan's settings.
 
-The variable ``TFCOMPOSE_LAUNCH`` holds these as JSON: ``file``, ``arguments``, ``namespace``,
-``remap``, ``sim_time``. The Python of ROS runs this file; tfcompose need not be installed there.
+The variable ``TFCOMPOSE_LAUNCH`` holds the settings as JSON: ``file``, ``arguments``,
+``namespace``, ``remap``, ``sim_time``. The Python installation of ROS runs this file. tfcompose
+need not be installed there.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from launch_ros.actions import PushRosNamespace, SetParameter, SetRemap
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the user's file in a group that sets namespace, remappings and simulated time."""
+    """Return the user's launch file in a group with namespace, remappings and simulated time."""
     settings = json.loads(os.environ["TFCOMPOSE_LAUNCH"])
     group = [PushRosNamespace(settings["namespace"])] if settings["namespace"] else []
     group += [SetRemap(old, new) for old, new in settings["remap"].items()]

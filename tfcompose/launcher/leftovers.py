@@ -1,7 +1,7 @@
-"""Processes that a run left behind, and a launcher's descendants.
+"""Processes that a run left behind, and descendants of a launcher.
 
-Leftovers have the run id in their environment. Both are found even if they left their group and
-session; leftovers even if the launcher was killed.
+Leftovers have the run id in their environment. Both kinds are found even if they left their
+process group and session. Leftovers are found even if the launcher was killed.
 """
 
 from __future__ import annotations
@@ -19,26 +19,29 @@ from tfcompose.model.variables import LAUNCHER, PROCESS, RUN_ID
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-#: The kernel ends a killed process within this time, in seconds, also where much is going on.
+#: The kernel ends a killed process within this time, in seconds, even under high load.
 KILLED_WITHIN_S = 5.0
 
 
 def descendants(ancestor: int, but: int) -> dict[int, int]:
-    """Return the group of each descendant of ``ancestor``, except ``but`` and its descendants."""
+    """Return the process group of each descendant of ``ancestor``, by pid.
+
+    The process ``but`` and its descendants are left out.
+    """
     running: dict[int, procfs.Stat] = {}
     for pid in procfs.pids():
         with contextlib.suppress(OSError):
             stat = procfs.stat(pid)
             if stat.state != "Z":
                 running[pid] = stat
-    found: dict[int, int] = {}
+    depths: dict[int, int] = {}
     for pid, stat in running.items():
         above = pid
         while above not in {ancestor, but} and above in running:
             above = running[above].parent
         if above == ancestor and pid != ancestor:
-            found[pid] = stat.group
-    return found
+            depths[pid] = stat.group
+    return depths
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,61 +52,64 @@ class Leftover:
     #: The run's id.
     run: str
     command: str
-    #: In clock ticks since boot.
+    #: Start time in clock ticks since boot.
     began: int
-    #: The launcher's process id while it runs; the process is not left behind then.
+    #: The launcher's process id while the launcher runs. Then the process is not left behind.
     launcher: int | None = None
-    #: The plan's process that started it; empty if its environment does not name one.
+    #: The process of the plan that started it; empty if unknown.
     process: str = ""
 
 
 def launcher_mark() -> str:
-    """Return the mark by which a run's processes identify this process as their launcher."""
+    """Return the mark by which processes of a run identify this process as their launcher."""
     return f"{os.getpid()}:{procfs.stat('self').began}"
 
 
 def leftovers(run: str) -> list[Leftover]:
-    """Return the processes whose run id is ``run`` or begins with it.
+    """Return the processes whose run id is or begins with ``run``.
 
-    "rover@0:" matches all runs of rover.
+    For example, "rover@0:" matches all runs of rover.
     """
-    found = []
+    remaining = []
     for pid in procfs.pids():
         with contextlib.suppress(OSError):
             if pid != os.getpid() and (leftover := _leftover_of(pid, run)):
-                found.append(leftover)
-    return found
+                remaining.append(leftover)
+    return remaining
 
 
 def leftovers_of(pids: Iterable[int], run: str) -> list[Leftover]:
-    """Return those of these processes that run, as leftovers of this run."""
-    found = []
+    """Return the running processes among ``pids``, as leftovers of this run."""
+    remaining = []
     for pid in pids:
         with contextlib.suppress(OSError):
-            found.append(Leftover(pid, run, _command(pid), procfs.stat(pid).began))
-    return found
+            remaining.append(Leftover(pid, run, _command(pid), procfs.stat(pid).began))
+    return remaining
 
 
 def signal_leftovers(run: str, processes: Collection[str], number: signal.Signals) -> None:
-    """Signal what these processes, now ended, left behind in this run."""
+    """Signal the leftovers in this run of the given processes, which have ended."""
     for leftover in leftovers(run):
         if leftover.process in processes:
             _send(leftover, number)
 
 
-def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
-    """Terminate leftovers, kill those alive after ``patience_s`` seconds; return survivors."""
+def end(processes: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
+    """Terminate leftovers, and kill those alive after ``patience_s`` seconds.
+
+    Return the processes that survive both.
+    """
     for number, wait_s in ((signal.SIGTERM, patience_s), (signal.SIGKILL, KILLED_WITHIN_S)):
-        for leftover in found:
+        for leftover in processes:
             _send(leftover, number)
         until = time.monotonic() + wait_s
         while (
-            found := [leftover for leftover in found if _is_there(leftover)]
+            processes := [leftover for leftover in processes if _is_there(leftover)]
         ) and time.monotonic() < until:
             time.sleep(0.02)
-        if not found:
+        if not processes:
             break
-    return found
+    return processes
 
 
 def _leftover_of(pid: int, run: str) -> Leftover | None:
@@ -125,7 +131,7 @@ def _command(pid: int) -> str:
 
 
 def _launcher(mark: str) -> int | None:
-    """Return the launcher's process id if it still runs, in this network namespace."""
+    """Return the launcher's process id if it still runs in this network namespace."""
     number, _, since = mark.partition(":")
     with contextlib.suppress(OSError, ValueError):
         pid = int(number)
@@ -135,7 +141,7 @@ def _launcher(mark: str) -> int | None:
 
 
 def _send(leftover: Leftover, number: int) -> None:
-    """Send the signal to exactly that process, not to a later one with the same id."""
+    """Send the signal to exactly this process, not to a later process with the same id."""
     with contextlib.suppress(OSError):
         descriptor = os.pidfd_open(leftover.pid)
         try:

@@ -1,10 +1,11 @@
 """Process machine: the next state and actions, as a function of state, event and time.
 
-The guard starts first, after the processes it waits for, and listens. Once it reports that no node
-publishes a planned edge, the others follow in the plan's order, each when its conditions are met.
-A guard that is switched off only reports which edges are live, and no process waits for it. On a
-failure or a request, everything is stopped: each process after those that wait for it, the guard
-last. Reports from the guard during the stop are ignored, because a stopped owner falls silent.
+The guard starts first, after the processes that it waits for, and observes the tree. Once it
+reports that no node publishes an edge of the plan, the other processes start in the plan's order,
+each when its conditions are met. A guard in mode ``off`` only reports live edges, and no process
+waits for it. After a failure or a request, all processes stop. Each process stops after the
+processes that wait for it, and the guard stops last. Reports from the guard during the stop are
+ignored, because the edges of a stopped owner fall silent.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from tfcompose.launcher.state import StopReason, Transition, by_owner
 from tfcompose.launcher.stopping import (
     backoff_s,
     edge_taken,
-    firmer_at,
+    escalate_at,
     follow_plan,
     order_descriptions,
     refusal,
@@ -59,6 +60,8 @@ from tfcompose.model.messages import (
     ComponentState,
     CurrentFindings,
     DescriptionState,
+    EdgeTaken,
+    FilterBypassed,
     FindingShown,
     GateState,
     Live,
@@ -70,9 +73,7 @@ from tfcompose.model.messages import (
     RecoveredShown,
     Remember,
     Silent,
-    Taken,
     TreeComplete,
-    Unfenced,
     Waiting,
 )
 
@@ -84,7 +85,7 @@ if TYPE_CHECKING:
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
-    """Return the state after the event, and the actions in order.
+    """Return the state after the event, and the resulting actions in order.
 
     ``now`` is monotonic time in seconds.
     """
@@ -97,20 +98,24 @@ def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, .
 
 
 def wake_time(state: State) -> float | None:
-    """Return when the machine next needs a ``Tick``; None if it only waits for events."""
+    """Return the time of the next ``Tick`` in monotonic seconds, None if only events matter."""
     times, due = state.times, []
     for tracked in state.tracked.values():
         if tracked.state == "backoff":
             due.append(tracked.since + backoff_s(times, tracked.process, tracked.failures))
-        firmer = firmer_at(times, tracked)
+        escalation = escalate_at(times, tracked)
         gate = [
-            at for at in (firmer, opens_at(tracked), late_at(state, tracked)) if at is not None
+            time_s
+            for time_s in (escalation, opens_at(tracked), late_at(state, tracked))
+            if time_s is not None
         ]
-        due += gate if state.stop is None else gate[: firmer is not None]
+        due += gate if state.stop is None else gate[: escalation is not None]
     if state.stop is None and state.begun is not None:
         if state.clear is None:
             due.append(state.begun + times.clear_s)
-        due += [at for at in (_guard_due(state), _reminder_due(state)) if at is not None]
+        due += [
+            time_s for time_s in (_guard_due(state), _reminder_due(state)) if time_s is not None
+        ]
     return min(due, default=None)
 
 
@@ -132,7 +137,7 @@ def _react(step: Transition, event: Event) -> None:
                 take_component_answer(step, event)
         case DescriptionState(process) if process in step.state.tracked:
             take_description_answer(step, event)
-        case Taken(finding):
+        case EdgeTaken(finding):
             edge_taken(step, finding)
         case _:
             stop_if_requested(step, event)
@@ -155,7 +160,7 @@ def _take_request_or_report(step: Transition, event: Event) -> None:
                 open_gate(step, process, observed)
         case OwnerReady(process) if process in step.state.tracked:
             _owner_ready(step, process)
-        case _:  # the guard's other events, and Tick
+        case _:  # other events of the guard, and Tick
             _take_guard_report(step, event)
 
 
@@ -183,18 +188,18 @@ def _take_start(step: Transition, name: str, pid: int) -> None:
         order_gate(step, step.state.tracked[name])
         return
     _expect_no_sign_of_life(step)
-    step.update(silent=frozenset(), findings=())  # it reports itself what is
-    if step.state.clear is not None:  # it joins the others
-        for other in step.state.tracked.values():
-            _introduce(step, other)
-            if not other.ready and other.state in ("running", "expected"):
-                order_gate(step, other)
+    step.update(silent=frozenset(), findings=())  # the new guard reports these itself
+    if step.state.clear is not None:  # the other processes already run
+        for tracked in step.state.tracked.values():
+            _introduce(step, tracked)
+            if not tracked.ready and tracked.state in ("running", "expected"):
+                order_gate(step, tracked)
     order_components(step)
     order_descriptions(step)
 
 
 def _introduce(step: Transition, owner: Tracked) -> None:
-    """Send a joining guard what happened to an owner meanwhile."""
+    """Send the orders about an owner that a restarted guard has missed."""
     name = owner.process.name
     runs = owner.state in ("starting", "running", "expected")
     missing = any(child not in step.state.live for _, child in owner.process.owns)
@@ -222,7 +227,7 @@ def _take_guard_report(step: Transition, event: Event) -> None:
             _complete(step, edges)
         case FindingShown(finding, process):
             _violation(step, finding, process)
-        case Unfenced(finding, process, pid):
+        case FilterBypassed(finding, process, pid):
             _report_left_fence(step, finding, process or _process_of(step.state, pid), pid)
         case RecoveredShown(text):
             step.notify(RecoveredShown(text, step.since_begin))
@@ -231,7 +236,7 @@ def _take_guard_report(step: Transition, event: Event) -> None:
 
 
 def _keep(step: Transition, event: Event) -> None:
-    """Keep the guard's report for other commands."""
+    """Store the guard's report for other commands and for the next guard."""
     match event:
         case Remember(changed):
             step.update(memory=step.state.memory | changed)
@@ -252,7 +257,7 @@ def _clear(step: Transition) -> None:
 
 
 def _owner_ready(step: Transition, process: str) -> None:
-    """Note that all edges of the owner are live."""
+    """Record that all edges of the owner are live."""
     if gate_of(step.state.tracked[process].process) == "edges":
         open_gate(step, process, "its edges are live")
     edges = step.state.plan.edges_of(process)
@@ -270,10 +275,9 @@ def _complete(step: Transition, edges: int) -> None:
 
 
 def _violation(step: Transition, finding: Finding, process: str) -> None:
-    """Report the guard's finding, and stop ``process`` or everything, by the plan's policy.
+    """Report the guard's finding, and stop ``process`` or all processes, by the plan's policy.
 
-    ``process`` is the certain offender; empty if that is not certain, or not a process of the
-    plan.
+    ``process`` is the offender if it is certain and belongs to the plan; otherwise empty.
     """
     policy = step.state.plan.guard.on_violation
     if finding.severity == "error" and policy == "stop":
@@ -286,15 +290,15 @@ def _violation(step: Transition, finding: Finding, process: str) -> None:
 
 
 def _process_of(state: State, pid: int) -> str:
-    """Return the plan's process with that process id; empty: none has it."""
+    """Return the process of the plan with this process id, "" without one."""
     started = (name for name, tracked in state.tracked.items() if tracked.pid == pid)
     return next(started, "")
 
 
 def _report_left_fence(step: Transition, finding: Finding, process: str, pid: int) -> None:
-    """Report a process that bypasses a strict plan's filter, and stop it by policy.
+    """Report a process that bypasses a strict plan's filter, and stop it by the plan's policy.
 
-    ``process`` is empty if a process of the plan started ``pid``, but it is unknown which.
+    ``process`` is empty if it is unknown which process of the plan started ``pid``.
     """
     if step.state.plan.guard.on_violation == "stop":
         _violation(step, finding, process)
@@ -321,10 +325,9 @@ def _with_note(finding: Finding, text: str) -> Finding:
     return replace(finding, notes=(*finding.notes, Note(text)))
 
 
-# A watchdog over the guard: one that hangs is ended, and started again like one that dies. It
-# reports once a second that it works. Where that does not come for long, the launcher itself may
-# have been kept from running; so it waits once more, with its own clock going, before it believes
-# it.
+# A watchdog for the guard. It kills a guard that hangs, and a killed guard restarts. A working
+# guard sends a sign of life every second. If signs of life are missing, the launcher itself may
+# have been suspended. So it waits again, by its own clock, before it kills the guard.
 
 
 def _expect_no_sign_of_life(step: Transition) -> None:
@@ -333,7 +336,10 @@ def _expect_no_sign_of_life(step: Transition) -> None:
 
 
 def _guard_due(state: State) -> float | None:
-    """Return when the guard is overdue, or counts as hung; None if no sign of life is expected."""
+    """Return when the guard becomes overdue, or counts as hung.
+
+    None if no sign of life is expected.
+    """
     if (
         state.guard is None
         or state.guard_alive is None
@@ -362,7 +368,7 @@ def _kill_a_guard_that_hangs(step: Transition) -> None:
 
 
 def _settle(step: Transition) -> None:
-    """Do what is due after the event."""
+    """Carry out everything that is due after the event."""
     state = step.state
     if state.begun is None:
         return
@@ -389,7 +395,7 @@ def _go_on(step: Transition) -> None:
         may_start = step.state.clear is not None or name in _before_clear(step.state)
         fresh = (
             tracked.state == "stopped"
-            and tracked.wanted
+            and tracked.should_run
             and may_start
             and not unmet(step.state, tracked)
         )
@@ -418,12 +424,15 @@ def _go_on(step: Transition) -> None:
 
 
 def _before_clear(state: State) -> tuple[str, ...]:
-    """Return what starts before the guard has listened: itself and its prerequisites."""
+    """Return the processes that start before the guard has observed the tree.
+
+    These are the guard and the processes that it waits for.
+    """
     return (state.guard, *state.tracked[state.guard].process.after) if state.guard else ()
 
 
 def _reminder_due(state: State) -> float | None:
-    """Return when to name the missing edges; None if there are no new ones."""
+    """Return when to report the missing edges, None if no further edges are missing."""
     if state.clear is None or state.complete or not state.awaited:
         return None
     if state.reminded is None:

@@ -1,13 +1,13 @@
-"""Output of the launcher and its processes: to the terminal, the control socket and log files.
+"""Output of the launcher and its processes to the terminal, the control socket and log files.
 
-The robot never waits for its reader, such as a suspended terminal or a pipe to a pager. Output
-that cannot be written at once is kept, up to a limit. Beyond it, lines of processes are dropped
-from the output and counted; the logs have them.
+The robot never waits for a reader of its output, such as a suspended terminal or a pager. Output
+that cannot be written at once is kept, up to a limit. Beyond the limit, log lines are dropped from
+this output and counted. The log files still contain them.
 
-Each process has one log file with lines ``TIME TEXT``, rotated when it is full. The times are
-local, with milliseconds and zone, so that lines of several files can be merged. The file ``runs``
-beside them has one line per run, with its start time. A full disk costs log lines, and stops no
-process.
+Each process has a log file with lines ``TIME TEXT``. A full file is rotated. Times are local, with
+milliseconds and time zone, so that lines of several files can be merged. The file ``runs`` in the
+same folder has a line with the start time of each run. If the disk is full, log lines are lost,
+but no process stops.
 """
 
 from __future__ import annotations
@@ -39,14 +39,15 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import Notice, ProcessMessage, Request
 
 
-#: Buffer for a slow reader; the launcher's own messages may use as much again; bytes.
+#: Limit of log output kept for a slow reader, in bytes. With the launcher's own messages, twice as
+#: much is kept.
 KEPT = 256 * 1024
-#: Size that a ready pipe or terminal accepts at once; bytes.
+#: Number of bytes that a ready pipe or terminal accepts at once.
 PIECE = 4096
 
 
 class NonBlockingOutput:
-    """Writes to a file descriptor without waiting."""
+    """Writes to a file descriptor without blocking."""
 
     def __init__(self, fd: int) -> None:
         self.fd, self._own = _not_waiting(fd)
@@ -56,14 +57,14 @@ class NonBlockingOutput:
 
     @property
     def owes(self) -> bool:
-        """Whether there is output left to write."""
+        """Whether pending output remains."""
         return bool(self._owed)
 
     def write(self, text: str, *, log: bool = False) -> None:
-        """Write as much as possible now; drop a log line if too much is pending.
+        """Write as much as possible now. Drop a log line if too much output is pending.
 
         Raises:
-            OSError: if the reader is gone.
+            OSError: if the reader has gone.
         """
         limit = KEPT if log else 2 * KEPT
         if len(self._owed) > limit:
@@ -78,10 +79,10 @@ class NonBlockingOutput:
         self.push()
 
     def push(self) -> None:
-        """Write as much as possible now.
+        """Write as much pending output as possible now.
 
         Raises:
-            OSError: if the reader is gone.
+            OSError: if the reader has gone.
         """
         while self._owed:
             if not self._own and not select.select([], [self.fd], [], 0)[1]:
@@ -93,7 +94,7 @@ class NonBlockingOutput:
             except OSError as error:
                 if error.errno not in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
                     raise
-                # A full disk stops no robot.
+                # A full disk does not stop the robot.
                 self.left_out += self._owed.count(b"\n") + self._announced - (self._announced > 0)
                 self._announced = 0
                 self._owed.clear()
@@ -102,14 +103,17 @@ class NonBlockingOutput:
             self._announced = self._announced if self._owed else 0
 
     def finish(self, patience_s: float = 0.5) -> None:
-        """Write the rest, drop what the reader does not take within ``patience_s`` seconds."""
+        """Write pending output.
+
+        Drop output that the reader does not accept in ``patience_s`` s.
+        """
         with contextlib.suppress(OSError):
             while self._owed and select.select([], [self.fd], [], patience_s)[1]:
                 self.push()
         self._owed.clear()
 
     def close(self) -> None:
-        """Write the rest as far as the reader takes it, and release the terminal or pipe."""
+        """Write pending output if the reader accepts it, and close the terminal or pipe."""
         try:
             self.finish()
         finally:
@@ -118,10 +122,10 @@ class NonBlockingOutput:
 
 
 def _not_waiting(fd: int) -> tuple[int, bool]:
-    """Return a non-blocking descriptor for the same file, and whether it is a new one.
+    """Return a non-blocking descriptor for the same file, and whether it never blocks.
 
-    The flag belongs to the open file description, and other processes share it, so pipes and
-    terminals are opened again. Regular files never block.
+    The flag O_NONBLOCK belongs to the open file description, which other processes share. So pipes
+    and terminals are opened again. Regular files never block.
     """
     kind = os.fstat(fd).st_mode
     if stat.S_ISREG(kind):
@@ -142,29 +146,29 @@ class EventStream:
     def __init__(self, path: str) -> None:
         flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
         self.fd = os.open(path, flags, 0o640)
-        #: Whether a reader can go away.
+        #: Whether its reader can close it.
         self.is_pipe = stat.S_ISFIFO(os.fstat(self.fd).st_mode)
         self._output = NonBlockingOutput(self.fd)
 
     def write(self, line: str) -> None:
-        """Write a notice; keep what the reader does not take now.
+        """Write a notice. Keep output that the reader does not accept now.
 
         Raises:
-            OSError: if the reader is gone.
+            OSError: if the reader has gone.
         """
         self._output.write(f"{line}\n")
 
     def push(self) -> None:
-        """Write what was kept, as far as the reader takes it now.
+        """Write pending output that the reader accepts now.
 
         Raises:
-            OSError: if the reader is gone.
+            OSError: if the reader has gone.
         """
         if self._output.owes:
             self._output.push()
 
     def close(self) -> None:
-        """Write the rest, as far as the reader takes it, and close the file."""
+        """Write pending output that the reader accepts, and close the file."""
         self._output.close()
         if self._output.fd != self.fd:
             os.close(self.fd)
@@ -173,8 +177,8 @@ class EventStream:
 class Notifier:
     """Passes notices to the user's output and to clients of the control socket.
 
-    Calls ``lost`` once, when the reader of ``output`` or ``events`` is gone, and ``refresh``
-    regularly.
+    It calls ``lost`` once when the reader of ``output`` or ``events`` has gone, and calls
+    ``refresh`` regularly.
     """
 
     def __init__(  # noqa: PLR0913 (made in one place)
@@ -199,7 +203,7 @@ class Notifier:
             selector.register(events.fd, selectors.EVENT_READ, self._lose_events)
 
     def listen(self, listener: socket, answer: Callable[[Request], ProcessMessage]) -> None:
-        """Take requests of other commands at this control socket instead of the last one."""
+        """Accept requests of other commands at this control socket instead of the previous one."""
         if self._control:
             self._control.listen(listener)
         else:
@@ -213,7 +217,7 @@ class Notifier:
             self._events.close()
 
     def notify(self, notice: Notice) -> None:
-        """Pass the notice on."""
+        """Pass on the notice."""
         if (self._control or self._events) and not isinstance(notice, LogLine):
             line = notice_line(notice, time.time())
             if self._control:
@@ -223,7 +227,7 @@ class Notifier:
             self._try(partial(self._report, notice))
 
     def catch_up(self) -> None:
-        """Refresh the view, and have pending output written when its reader is ready again."""
+        """Refresh the view. Watch for a ready reader if output is pending."""
         if self._refresh and self._report:
             self._try(self._refresh)
         self._try_events(EventStream.push)
@@ -247,7 +251,7 @@ class Notifier:
                 self._lose_events()
 
     def _lose_events(self) -> None:
-        """End the robot with the program that reads its events."""
+        """Stop the robot because the program that reads its events has ended."""
         if self._events:
             if self._events.is_pipe:
                 self._selector.unregister(self._events.fd)
@@ -265,12 +269,12 @@ class Notifier:
             self._lost()
 
 
-#: Size at which a log file is rotated, and the number of old files kept; bytes.
+#: Size in bytes at which a log file is rotated, and number of old files to keep.
 FILE_BYTES = 8_000_000
 KEPT_FILES = 2
 #: Number of runs whose start times are kept.
 KEPT_RUNS = 100
-#: Pause before the disk is tried again after a failure, in seconds.
+#: Pause before the next attempt to write after a failure, in seconds.
 LEFT_ALONE_S = 5.0
 
 
@@ -283,7 +287,7 @@ class _Log:
 
 @dataclass(slots=True)
 class Logs:
-    """The log files of one run."""
+    """The log files of a run."""
 
     folder: Path
     file_bytes: int = FILE_BYTES
@@ -296,7 +300,7 @@ class Logs:
     _stamp: tuple[str, str] = ("", "")
 
     def write(self, process: str, text: str) -> str | None:
-        """Append a line; return the reason for the first failure, else None."""
+        """Append a line. Return the reason for the first failure, otherwise None."""
         stamp = self._time(time.time())
         if time.monotonic() - self._failed < LEFT_ALONE_S:
             self.lost += 1
@@ -307,7 +311,7 @@ class Logs:
             if log.size + len(data) > self.file_bytes:
                 log = self._rotate(process, log, stamp)
             if os.write(log.fd, data) != len(data):
-                os.write(log.fd, b"\n")  # no room for all of it: the next attempt says why
+                os.write(log.fd, b"\n")  # the line was truncated; the next write reports why
             log.size += len(data)
         except OSError as error:
             first, self._failed, self.lost = self.lost == 0, time.monotonic(), self.lost + 1
@@ -321,7 +325,7 @@ class Logs:
         self._open.clear()
 
     def _begin(self, process: str, stamp: str) -> _Log:
-        path = self.folder / f"{process}.log"  # of a part in a folder: arm/driver
+        path = self.folder / f"{process}.log"  # a part's process has a folder: arm/driver
         path.parent.mkdir(parents=True, exist_ok=True)
         for folder in {self.folder, path.parent}:
             _ensure_own(folder)
@@ -358,23 +362,23 @@ class Logs:
 
 
 def _ensure_own(folder: Path) -> None:
-    """Refuse another user's folder, as in a shared ROS_LOG_DIR, and links.
+    """Reject a link, and a folder of another user, as in a shared ROS_LOG_DIR.
 
     Raises:
-        OSError: if it is a link, or another user's.
+        OSError: if the folder is a link or belongs to another user.
     """
-    found = folder.lstat()
-    if stat.S_ISLNK(found.st_mode):
+    status = folder.lstat()
+    if stat.S_ISLNK(status.st_mode):
         raise OSError(errno.EPERM, "the folder is a link", str(folder))
-    if found.st_uid != os.geteuid():
+    if status.st_uid != os.geteuid():
         raise OSError(errno.EPERM, "the folder is another user's", str(folder))
 
 
 def _ensure_kept(folder: Path) -> None:
-    """Refuse a folder whose owner, unless root, could replace its content with a link.
+    """Reject a folder whose owner could replace its content with a link. Root is trusted.
 
     Raises:
-        OSError: if it is another user's.
+        OSError: if the folder belongs to another user.
     """
     if folder.lstat().st_uid not in {0, os.geteuid()}:
         raise OSError(errno.EPERM, f"{folder} is another user's", str(folder))
@@ -388,9 +392,9 @@ def logged_processes(folder: Path) -> list[str]:
 
 
 def last_modified(folder: Path) -> float:
-    """Return when a line was last written below the folder, in seconds since 1970; 0: never.
+    """Return the time of the last log line below the folder, in seconds since 1970; 0 if none.
 
-    A folder's own time only tells when its last file was created.
+    The modification time of the folder only tells when its last file was created.
     """
     return max((file.stat().st_mtime for file in folder.rglob("*.log")), default=0.0)
 
@@ -398,9 +402,10 @@ def last_modified(folder: Path) -> float:
 def read_logs(
     folder: Path, names: list[str], begin_s: float = 0.0, end_s: float = math.inf
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield (time, process, text) of these processes' lines, oldest first.
+    """Yield (time, process, text) of the processes' log lines, oldest first.
 
-    Only lines from ``begin_s`` on and before ``end_s``, in seconds since 1970.
+    Only lines from ``begin_s`` up to, but not including, ``end_s`` are read. Times are in seconds
+    since 1970.
     """
     lines: Iterator[tuple[str, str, str]]
     lines = heapq.merge(*(_lines(folder, name) for name in names), key=lambda line: line[0])
@@ -420,7 +425,7 @@ def _run_lines(folder: Path) -> list[str]:
 
 
 def _instant(stamp: str) -> float:
-    """Return the time of a line in seconds since 1970; 0 if the line is torn."""
+    """Return the time of a line in seconds since 1970; 0 for an incomplete line."""
     try:
         return datetime.fromisoformat(stamp).timestamp()
     except ValueError:
@@ -437,19 +442,19 @@ def _lines(folder: Path, name: str) -> Iterator[tuple[str, str, str]]:
             file.open(encoding="utf-8", errors="replace", newline="\n") as lines,
         ):
             for line in lines:
-                at, _, text = line.rstrip("\n").partition(" ")
-                yield at, name, text
+                time_text, _, text = line.rstrip("\n").partition(" ")
+                yield time_text, name, text
 
 
 class Follower:
-    """Reads new lines of the logs, across rotation."""
+    """Reads new log lines, also after a rotation."""
 
     def __init__(
         self, folder: Path, names: list[str], *, back: int = 0, since_s: float = 0.0
     ) -> None:
-        """Begin at the current end, or at the first line within ``back`` bytes before it.
+        """Start at the current end, or at the first line in the last ``back`` bytes.
 
-        Skips lines from before ``since_s``, in seconds since 1970.
+        Lines from before ``since_s``, in seconds since 1970, are skipped.
         """
         self._since_s = since_s
         self._folder, self._names = folder, names
@@ -457,14 +462,14 @@ class Follower:
         self._rest = dict.fromkeys(names, b"")
 
     def more(self) -> list[tuple[str, str, str]]:
-        """Return (time, process, text) of the lines since the last call, oldest first."""
-        found = [
+        """Return (time, process, text) of all lines since the previous call, oldest first."""
+        lines = [
             line
             for name in self._names
             for line in self._more(name)
             if not self._since_s or _instant(line[0]) >= self._since_s
         ]
-        return sorted(found, key=lambda line: line[0])
+        return sorted(lines, key=lambda line: line[0])
 
     def _before(self, back: int, inode: int, end: int, name: str) -> tuple[int, int]:
         begin = max(end - back, 0)
@@ -475,10 +480,10 @@ class Follower:
 
     def _end(self, name: str) -> tuple[int, int]:
         try:
-            found = (self._folder / f"{name}.log").stat()
+            status = (self._folder / f"{name}.log").stat()
         except OSError:
             return (0, 0)
-        return (found.st_ino, found.st_size)
+        return (status.st_ino, status.st_size)
 
     def _more(self, name: str) -> Iterator[tuple[str, str, str]]:
         inode, offset = self._at[name]
@@ -486,7 +491,7 @@ class Follower:
         if end == (inode, offset):
             return
         data = b""
-        if end[0] != inode:  # it was turned over: first the rest of the old one
+        if end[0] != inode:  # the file was rotated: read the rest of the old file first
             old = self._folder / f"{name}.log.1"
             with contextlib.suppress(OSError):
                 if old.stat().st_ino == inode:
@@ -499,8 +504,8 @@ class Follower:
         self._at[name] = (end[0], offset)
         *complete, self._rest[name] = (self._rest[name] + data).split(b"\n")
         for line in complete:
-            at, _, text = line.decode(errors="replace").partition(" ")
-            yield at, name, text
+            time_text, _, text = line.decode(errors="replace").partition(" ")
+            yield time_text, name, text
 
 
 def _from(file: Path, offset: int) -> bytes:

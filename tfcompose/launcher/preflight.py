@@ -1,10 +1,12 @@
-"""Checks before the start: each process's command, and all that cannot work on this machine.
+"""Finds the command of each process, and checks before the start what the process requires.
 
-Values that only the starting machine knows are placeholders in a plan; ``tfcompose.model.plan``
-lists them. A ROS package's program, ``${executable:PACKAGE/NAME}``, is ``lib/PACKAGE/NAME`` below
-one of the prefixes of AMENT_PREFIX_PATH, else NAME on the PATH. A launch file,
-``${launch:PACKAGE/FILE}``, is FILE in PACKAGE's share folder, anywhere below it, or at the given
-path. It starts as one process: ``ros2 launch`` with a wrapper around the file.
+A plan contains placeholders for values that only the starting machine knows. The comment at
+``PROGRAM`` in ``tfcompose.model.plan.plan`` lists them. ``${executable:PACKAGE/NAME}`` is the
+program ``lib/PACKAGE/NAME`` below a prefix in AMENT_PREFIX_PATH, otherwise NAME on the PATH.
+``${launch:PACKAGE/FILE}`` is a launch file in PACKAGE's share folder. FILE is its name or
+the end of its path. The search begins in the share folder itself and its folder ``launch``, and
+continues in all folders below. A launch file starts as a single process: ``ros2 launch`` with a
+wrapper around the file.
 """
 
 from __future__ import annotations
@@ -41,15 +43,17 @@ _ROS_EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
 _LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
 _OUTPUT = "OVERRIDE_LAUNCH_PROCESS_OUTPUT"
 _WRAPPER = Path(__file__).absolute().with_name("launch_wrapper.py")
-#: The variable in which the wrapper is given the launch file, and what the plan says of it.
+#: The variable with the launch file and its settings, which the wrapper reads.
 LAUNCH = "TFCOMPOSE_LAUNCH"
 _KINDS = ("*launch.py", "*launch.xml", "*launch.yaml", "*launch.yml")
 
 
 class Environment(Protocol):
-    """Makes a process's environment; ``own``: the process is one of tfcompose's own."""
+    """Returns the environment of a process; ``is_built_in``: it is a process of tfcompose."""
 
-    def __call__(self, base: Mapping[str, str], ros: RosSettings, *, own: bool) -> dict[str, str]:
+    def __call__(
+        self, base: Mapping[str, str], ros: RosSettings, *, is_built_in: bool
+    ) -> dict[str, str]:
         """Return the environment.
 
         Raises:
@@ -63,13 +67,13 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     plan_file: Path,
     base: Mapping[str, str],
     environment: Environment,
-    built_in: Path | None = None,
+    build_folder: Path | None = None,
 ) -> tuple[dict[str, ChildCommand], list[Finding]]:
-    """Return each process's command, and the findings; start nothing if there are findings.
+    """Return the command of each process, and findings. With findings, nothing may start.
 
-    ``built_in`` is the folder that the plan was built in, if ``plan_file`` is a copy.
+    ``build_folder`` is the folder in which the plan was built, if ``plan_file`` is a copy.
     """
-    folder = built_in or plan_file.absolute().parent
+    folder = build_folder or plan_file.absolute().parent
     findings = [*_never_started(plan), *_check_by_tools(plan)]
     commands: dict[str, ChildCommand] = {}
     missing = []
@@ -110,15 +114,15 @@ def _command_of(
     base: Mapping[str, str],
     environment: Environment,
 ) -> ChildCommand | NotFound | Finding:
-    own = process.kind != "run"
-    env = environment(base, ros, own=own) | own_env(process, *files)
+    is_built_in = process.kind != "run"
+    env = environment(base, ros, is_built_in=is_built_in) | own_env(process, *files)
     if process.argv[:1] == (PROGRAM,):
         env = without_current_folder(env)
     argv = fill_argv(process, *files)
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, *files)
-    if not own and not folder.is_dir():
+    if not is_built_in and not folder.is_dir():
         lost = f"the working directory {folder} of {process.name} does not exist"
         return (
             ChildCommand(argv, env, folder, missing=lost)
@@ -138,7 +142,7 @@ def _command_of(
         command = (
             program
             if isinstance(program, NotFound)
-            else ChildCommand((program, *argv[1:]), env, folder, own)
+            else ChildCommand((program, *argv[1:]), env, folder, is_built_in)
         )
     if isinstance(command, ChildCommand):
         command = replace(command, process=process)
@@ -155,17 +159,17 @@ def _command_of(
 
 
 def _check_by_tools(plan: Plan) -> Iterator[Finding]:
-    """Yield the findings of tools with a section or a command in the plan."""
+    """Yield findings of the tools that have a section or a command in the plan."""
     commands = {
         ("command", process.argv[1])
         for process in plan.managed
         if process.kind == "run" and process.argv[:1] == (PROGRAM,)
     }
-    wanted = commands | {("key", name) for name in plan.sections}
-    for tool in installed_tools().tools if wanted else ():
-        if tool.preflight and not wanted.isdisjoint(tool.names()):
-            found = run_hook(tool.preflight, tool.name, None, plan)
-            yield from [found] if isinstance(found, Finding) else found
+    features = commands | {("key", name) for name in plan.sections}
+    for tool in installed_tools().tools if features else ():
+        if tool.preflight and not features.isdisjoint(tool.names()):
+            findings = run_hook(tool.preflight, tool.name, None, plan)
+            yield from [findings] if isinstance(findings, Finding) else findings
 
 
 def _with_mark(guard: ChildCommand) -> ChildCommand:
@@ -173,26 +177,29 @@ def _with_mark(guard: ChildCommand) -> ChildCommand:
 
 
 def _never_started(plan: Plan) -> list[Finding]:
-    """Return a finding for each process that waits for something that cannot happen."""
-    known = {process.name: process for process in plan.processes}
+    """Return findings about start conditions that can never be met.
+
+    Each such condition has its own finding. Processes that wait for each other share one.
+    """
+    processes = {process.name: process for process in plan.processes}
     findings = []
     for process in plan.processes:
         for name, what in process.after.items():
-            if name not in known:
+            if name not in processes:
                 findings.append(
                     finding(
                         "TF902", f"{process.name} waits for {name}, which is not in the plan", None
                     )
                 )
-            elif what == "done" and known[name].kind != "run":
+            elif what == "done" and processes[name].kind != "run":
                 message = f"{process.name} waits until {name} is {what}, which never happens"
                 findings.append(finding("TF902", message, None))
     waiting = {
-        process.name: set(process.after) & set(known)
+        process.name: set(process.after) & set(processes)
         for process in plan.processes
         if process.kind != "guard"
     }
-    while free := [name for name, others in waiting.items() if not others & set(waiting)]:
+    while free := [name for name, awaited in waiting.items() if not awaited & set(waiting)]:
         for name in free:
             del waiting[name]
     if waiting:
@@ -201,7 +208,7 @@ def _never_started(plan: Plan) -> list[Finding]:
 
 
 def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]:
-    """Return why containers cannot load components, if the plan has any."""
+    """Return findings about components that containers cannot load."""
     names = [process.name for process in processes if process.component]
     if not names:
         return []
@@ -217,14 +224,14 @@ def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]
 
 
 def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
-    """Return the process's folder; the plan's becomes absolute and without ``..``."""
+    """Return the working directory of the process, absolute and without ``..``."""
     if process.cwd is None:
         return _here()
     return Path(os.path.normpath(build_dir / _fill(process.cwd, process, plan_file, build_dir)))
 
 
 def _here() -> Path:
-    """Return the current folder, or its former path if it was removed."""
+    """Return the working directory, or its former path if it was removed."""
     try:
         return Path.cwd()
     except FileNotFoundError:
@@ -234,7 +241,11 @@ def _here() -> Path:
 def fill_argv(
     process: PlanProcess, plan_file: Path, build_dir: Path | None = None
 ) -> tuple[str, ...]:
-    """Return the process's ``argv`` with the placeholders replaced; both paths are absolute."""
+    """Return the process's ``argv``, with paths of this machine instead of placeholders.
+
+    The placeholders ``${executable:…}`` and ``${launch:…}`` remain; they are resolved later.
+    ``plan_file`` and ``build_dir`` must be absolute.
+    """
     is_ours = process.argv[:1] == (PROGRAM,)
     start, argv = (HERE, process.argv[1:]) if is_ours else ((), process.argv)
     return (*start, *(_fill(argument, process, plan_file, build_dir) for argument in argv))
@@ -243,7 +254,7 @@ def fill_argv(
 def own_env(
     process: PlanProcess, plan_file: Path, build_dir: Path | None = None
 ) -> dict[str, str]:
-    """Return the variables that the plan gives the process, with the placeholders replaced."""
+    """Return the variables that the plan sets for the process, with placeholders replaced."""
     return {
         name: _fill(value, process, plan_file, build_dir) for name, value in process.env.items()
     }
@@ -261,20 +272,20 @@ def _fill(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | No
 
 @dataclass(frozen=True, slots=True)
 class NotFound:
-    """A program that was not found.
-
-    Its process, its name, the folders searched, and a hint.
-    """
+    """A program or launch file that was not found, and the process that needs it."""
 
     process: str
     program: str
+    #: Sentences about the places that were searched.
     places: tuple[str, ...]
+    #: The value of PATH; empty if PATH was not searched.
     path: str = ""
+    #: What the user can do.
     advice: tuple[str, ...] = ()
 
 
 def not_found(missing: Sequence[NotFound]) -> Finding:
-    """Return one finding for all programs that were not found."""
+    """Return a single finding for all programs that were not found."""
     what = ", ".join(f"{program.program} of {program.process}" for program in missing)
     message = f"{len(missing)} executables were not found: {what}"
     if len(missing) == 1:
@@ -296,7 +307,7 @@ def executable_of(
 ) -> str | NotFound:
     """Return the path of the program that ``argument`` names, or a NotFound.
 
-    A relative path is looked up in ``folder``, a bare name on the PATH of ``env``.
+    A relative path starts in ``folder``. A bare name is searched on the PATH in ``env``.
     """
     ros = _ROS_EXECUTABLE.fullmatch(argument)
     if ros:
@@ -336,7 +347,7 @@ def _in_package(
     notes = [_why_not(folder / name) for folder in folders] or [
         "AMENT_PREFIX_PATH names no folder"
     ]
-    known = [
+    programs = [
         file.name for folder in folders if folder.is_dir() for file in sorted(folder.iterdir())
     ]
     otherwise = "source the setup file of your ROS installation first"
@@ -345,7 +356,7 @@ def _in_package(
         otherwise = (
             f"install the package {package} (on Ubuntu probably: sudo apt install {debian})"
         )
-    advice = (did_you_mean(name, known),) if known else (otherwise,)
+    advice = (did_you_mean(name, programs),) if programs else (otherwise,)
     return NotFound(process.name, f"{package}/{name}", tuple(notes), path_variable, advice)
 
 
@@ -370,7 +381,7 @@ def _is_launch(argument: str) -> bool:
 def _launch_command(
     process: PlanProcess, ros: RosSettings, argv: tuple[str, ...], env: Mapping[str, str]
 ) -> tuple[tuple[str, ...], dict[str, str]] | NotFound | Finding:
-    """Return the command and additional variables, or what is missing or wrong."""
+    """Return the command and additional variables, or the reason why there is none."""
     parsed = _LAUNCH.fullmatch(argv[0])
     package, name = (parsed[1], parsed[2]) if parsed else ("", "")
     path = env.get("PATH", os.defpath)
@@ -396,31 +407,47 @@ def _launch_command(
         "remap": process.remap,
         "sim_time": ros.clock == "sim",
     }
-    # By default ros2 launch writes its nodes' output to files of its own.
+    # By default, the launch log gets a node's output, and the screen only its stderr. ``both``
+    # sends stdout there too.
     more = {LAUNCH: json.dumps(settings, sort_keys=True), _OUTPUT: env.get(_OUTPUT) or "both"}
     return (ros2, "launch", "--noninteractive", str(_WRAPPER)), more
+
+
+def path_in_share(package: str, name: str, env: Mapping[str, str]) -> tuple[Path, str] | None:
+    """Return a package's share folder, and the path from it to a launch file.
+
+    Return None if no share folder of the package has the file.
+    """
+    for share in filter(Path.is_dir, _shares_of(package, env)):
+        direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
+        files = direct or sorted(share.rglob(name))
+        if files:
+            return share, files[0].relative_to(share).as_posix()
+    return None
+
+
+def _shares_of(package: str, env: Mapping[str, str]) -> list[Path]:
+    """Return the possible share folders of a package, overlays first."""
+    prefixes = env.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return [Path(prefix) / "share" / package for prefix in prefixes if prefix]
 
 
 def _find_launch_file(
     process: PlanProcess, package: str, name: str, env: Mapping[str, str]
 ) -> Path | NotFound:
-    prefixes = [prefix for prefix in env.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
-    shares = [Path(prefix) / "share" / package for prefix in prefixes]
+    if path := path_in_share(package, name, env):
+        return Path(*path)
+    shares = _shares_of(package, env)
     present = [share for share in shares if share.is_dir()]
-    for share in present:
-        direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
-        found = direct or sorted(share.rglob(name))
-        if found:
-            return found[0]
-    known = sorted(
+    files = sorted(
         {file.name for share in present for kind in _KINDS for file in share.rglob(kind)}
     )
     states = dict.fromkeys(present, f"has no {name}")
     notes = tuple(f"{share} {states.get(share, 'is not there')}" for share in shares)
-    listed = f"it has {', '.join(known[:12])}" if known else f"install the package {package}"
+    listed = f"it has {', '.join(files[:12])}" if files else f"install the package {package}"
     return NotFound(
         process.name,
         f"launch file {package}/{name}",
         notes or ("AMENT_PREFIX_PATH names no folder",),
-        advice=(did_you_mean(name, known, listed),),
+        advice=(did_you_mean(name, files, listed),),
     )

@@ -1,6 +1,7 @@
-"""Command lines of tfcompose's own processes, which import no module from the current folder.
+"""Command lines of tfcompose's own processes, which import no module from the working directory.
 
-``tfcompose.__main__`` removes that folder from Python's path before it imports anything.
+``tfcompose.__main__`` removes the working directory from Python's path before it imports any
+module.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 PYTHON_PATH = "PYTHONPATH"
-#: The processes of tfcompose's own, by the kind that plans and supervisors name, with the module
-#: whose ``main`` each runs. Everything else is a command.
+#: The ``main`` module of each process of tfcompose, by the name in its command line. Any other
+#: name is a command.
 PROCESSES = {
     "static": "tfcompose.launcher.publishers.static",
     "joints": "tfcompose.launcher.publishers.joints",
@@ -25,17 +26,17 @@ PROCESSES = {
     "exec": "tfcompose.launcher.exec",
     "rehearse": "tfcompose.launcher.rehearse",
 }
-#: Modules that more than one of the programs imports once it handles signals.
+#: Modules that several of these processes import after they handle signals.
 SHARED_MODULES = (
     "tfcompose.guard.process",
     "tfcompose.launcher.publishers.description",
     "tfcompose.launcher.publishers.simulate",
     "tfcompose.launcher.publishers.static",
 )
-#: Command that starts the program on this machine with the current installation.
+#: Command line that starts tfcompose from the current installation on this machine.
 HERE = (sys.executable, str(Path(__file__).absolute().parents[1] / "__main__.py"))
-#: The code that starts the program where only a Python that has tfcompose is known: it looks for
-#: it in the current folder last.
+#: Python code that starts tfcompose if only the Python that has it is known. It searches the
+#: working directory last.
 ANYWHERE_PARTS = (
     "import os, sys; sys.path.sort(key=['', os.getcwd()].__contains__);",
     " from tfcompose.__main__ import run; sys.exit(run())",
@@ -44,9 +45,9 @@ ANYWHERE = "".join(ANYWHERE_PARTS)
 
 
 def is_process(argv: Sequence[str]) -> bool:
-    """Return whether a command line starts one of tfcompose's own processes, not a command.
+    """Return whether a command line starts a process of tfcompose instead of a command.
 
-    ``guard`` is both: as a process it is given a plan and its name.
+    ``guard`` is both. As a process it gets a plan and a name as arguments.
     """
     kind, *first = [*argv, "-", "-", "-"][:3]
     if kind == "guard" and any(text.startswith("-") or ":=" in text for text in first):
@@ -61,7 +62,7 @@ def run_process() -> int:
 
 
 def load_shared() -> None:
-    """Import the processes' shared modules, and initialise nothing of ROS.
+    """Import the modules that processes share. Do not initialise ROS.
 
     Raises:
         ImportError: if ROS cannot be imported.
@@ -72,17 +73,17 @@ def load_shared() -> None:
 
 
 def anywhere(python: str) -> list[str]:
-    """Return the arguments that start the program on any machine, with that Python."""
+    """Return a command line that starts tfcompose on any machine with the given Python."""
     return [python, "-c", ANYWHERE]
 
 
 def without_current_folder(env: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment with a PYTHONPATH that does not include the current folder.
+    """Return the environment with a PYTHONPATH that does not contain the working directory.
 
-    An empty entry includes it, such as the last one of ``PYTHONPATH=/opt/lib:``. Python imports
-    some modules before it runs any of our code.
+    An empty entry means the working directory, such as the last entry of ``PYTHONPATH=/opt/lib:``.
+    Python imports some modules from PYTHONPATH before it runs any code of tfcompose.
     """
     entries = env.get(PYTHON_PATH, "").split(os.pathsep)
     kept = os.pathsep.join(entry for entry in entries if os.path.normpath(entry) != ".")
-    others = {name: value for name, value in env.items() if name != PYTHON_PATH}
-    return others | {PYTHON_PATH: kept} if kept else others
+    environment = {name: value for name, value in env.items() if name != PYTHON_PATH}
+    return environment | {PYTHON_PATH: kept} if kept else environment

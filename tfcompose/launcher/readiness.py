@@ -1,7 +1,7 @@
-"""Start conditions and readiness of processes, and reports of those that are late.
+"""Start conditions and readiness of processes, and reports about late processes.
 
-The launcher starts a process once the processes in the plan's ``after`` have reached the named
-states. The process counts as ready when its own readiness check passes.
+The launcher starts a process when the processes in the plan's ``after`` have reached the required
+states. A process counts as ready when its own readiness check passes.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from tfcompose.launcher.state import State, Tracked, Transition
     from tfcompose.model.plan import LifecycleState, PlanProcess, ReadyKind, StartCondition
 
-#: Gates that the guard watches.
+#: Readiness checks that the guard carries out.
 _GUARDED = ("edges", "topic", "service", "lifecycle")
-#: Maximum number of missing edges that are named.
+#: Maximum number of missing edges that a report lists.
 _NAMED_AT_MOST = 4
 
 
@@ -30,7 +30,7 @@ _NAMED_AT_MOST = 4
 
 
 def unmet(state: State, tracked: Tracked) -> tuple[tuple[str, StartCondition], ...]:
-    """Return the processes that this one still waits for, each with its condition."""
+    """Return the processes that a process still waits for, each with its condition."""
     return tuple(
         (name, what)
         for name, what in tracked.process.after.items()
@@ -39,39 +39,39 @@ def unmet(state: State, tracked: Tracked) -> tuple[tuple[str, StartCondition], .
 
 
 def unmet_in_words(state: State, tracked: Tracked) -> str:
-    """Return the conditions that keep a process from starting.
+    """Return the conditions that delay the start of a process, as text.
 
-    "slam to be ready and map to be done", or "".
+    For example "slam to be ready and map to be done"; "" without such conditions.
     """
     return " and ".join(f"{name} to be {what}" for name, what in unmet(state, tracked))
 
 
 def give_up_waiting(step: Transition) -> None:
-    """Fail the processes that wait for something that cannot happen any more."""
+    """Fail each process whose start condition can no longer be met."""
     for name, tracked in step.state.tracked.items():
-        if tracked.state != "stopped" or not tracked.wanted or tracked.failed:
+        if tracked.state != "stopped" or not tracked.should_run or tracked.failed:
             continue
-        for other, what in unmet(step.state, tracked):
-            found = step.state.tracked[other]
-            if found.failed or found.state == "exited":
-                why = "has failed" if found.failed else "has ended"
-                step.fail_process(name, waits_in_vain(name, other, what, why))
+        for awaited_name, what in unmet(step.state, tracked):
+            awaited = step.state.tracked[awaited_name]
+            if awaited.failed or awaited.state == "exited":
+                why = "has failed" if awaited.failed else "has ended"
+                step.fail_process(name, waits_in_vain(name, awaited_name, what, why))
                 break
 
 
-def _is_met(other: Tracked, what: StartCondition) -> bool:
+def _is_met(awaited: Tracked, what: StartCondition) -> bool:
     if what == "ready":
-        return other.ready
+        return awaited.ready
     if what == "done":
-        return other.state == "exited" and not other.failed
-    return other.was_started or other.state == "expected"
+        return awaited.state == "exited" and not awaited.failed
+    return awaited.was_started or awaited.state == "expected"
 
 
-# Gates.
+# Readiness checks, called gates.
 
 
 def gate_of(process: PlanProcess) -> ReadyKind | Literal["started"]:
-    """Return what the process's readiness depends on."""
+    """Return the kind of the process's readiness check."""
     if process.ready:
         return process.ready.kind
     if process.lifecycle:
@@ -80,12 +80,12 @@ def gate_of(process: PlanProcess) -> ReadyKind | Literal["started"]:
 
 
 def has_own_gate(process: PlanProcess) -> bool:
-    """Return whether the plan declares a readiness check for this process."""
+    """Return whether the plan declares a readiness check for the process."""
     return process.ready is not None or bool(process.lifecycle)
 
 
 def order_gate(step: Transition, tracked: Tracked) -> None:
-    """Tell the guard what to watch for, and which lifecycle nodes to bring into their states."""
+    """Order the guard to check the readiness and to bring lifecycle nodes into their states."""
     process, kind = tracked.process, gate_of(tracked.process)
     ready = process.ready
     by_edges = kind == "edges" and ready is not None
@@ -106,7 +106,7 @@ def order_gate(step: Transition, tracked: Tracked) -> None:
 
 
 def open_gate(step: Transition, name: str, observed: str = "") -> None:
-    """Note that the process is ready."""
+    """Record that the process is ready."""
     tracked = step.state.tracked[name]
     if tracked.ready:
         return
@@ -114,13 +114,13 @@ def open_gate(step: Transition, name: str, observed: str = "") -> None:
         name, replace(tracked, ready=True, ready_since=step.now, observed=observed, late=False)
     )
     if gate_of(tracked.process) == "edges" and has_own_gate(tracked.process):
-        step.actions.append(Order(Gate(name)))  # the guard need not watch it any more
+        step.actions.append(Order(Gate(name)))  # ends the check by the guard
     if has_own_gate(tracked.process):
         step.notify(ProcessReady(name, observed, step.since_begin))
 
 
 def check_gates(step: Transition) -> None:
-    """Open the gates that the guard does not watch, and report late ones."""
+    """Open the gates that the guard does not watch, and report late processes."""
     for name, tracked in step.state.tracked.items():
         if tracked.ready or not _is_awaited(tracked):
             continue
@@ -148,7 +148,7 @@ def check_gates(step: Transition) -> None:
 
 
 def late_at(state: State, tracked: Tracked) -> float | None:
-    """Return when the process is late; None if it has no limit."""
+    """Return when the process counts as late, None without a limit."""
     if tracked.ready or tracked.late or not _is_awaited(tracked):
         return None
     ready = tracked.process.ready
@@ -161,9 +161,9 @@ def late_at(state: State, tracked: Tracked) -> float | None:
 
 
 def _is_awaited(tracked: Tracked) -> bool:
-    """Return whether it is expected to become ready by itself.
+    """Return whether the process is expected to become ready without further actions.
 
-    For a component, whether its container was asked to load it.
+    For a component, return whether its container was asked to load it.
     """
     return tracked.state in ("running", "expected") or (
         tracked.state == "starting" and tracked.process.component is not None
@@ -171,7 +171,7 @@ def _is_awaited(tracked: Tracked) -> bool:
 
 
 def opens_at(tracked: Tracked) -> float | None:
-    """Return when a gate opens by itself; None if it does not."""
+    """Return when a gate opens by time, None for other gates."""
     ready = tracked.process.ready
     waits = (
         not tracked.ready
@@ -183,14 +183,17 @@ def opens_at(tracked: Tracked) -> float | None:
 
 
 def waits_for(state: State, tracked: Tracked) -> str:
-    """Return in words what a process needs to be ready; "" if it is, or must not run."""
+    """Return as text what a process waits for to be ready.
+
+    The text is empty if the process is ready or must not run.
+    """
     if (
         tracked.state == "stopped"
-        and tracked.wanted
+        and tracked.should_run
         and not tracked.failed
-        and (others := unmet_in_words(state, tracked))
+        and (conditions := unmet_in_words(state, tracked))
     ):
-        return f"waits for {others}"
+        return f"waits for {conditions}"
     if tracked.ready or not _is_awaited(tracked):
         return ""
     if tracked.state == "starting" and tracked.process.component:
@@ -221,23 +224,23 @@ def _late(state: State, tracked: Tracked, seconds: float) -> Finding:
     return finding("TF817", message, None, notes=notes)
 
 
-# All of them.
+# All processes.
 
 
 def is_ready(state: State) -> bool:
-    """Return whether every wanted process is ready or done, and every edge is live."""
+    """Return whether every process that should run is ready or done, and every edge is live."""
     if state.clear is None or state.stop or state.awaited:
         return False
-    wanted = [
-        tracked for tracked in state.tracked.values() if tracked.wanted and not tracked.failed
+    needed = [
+        tracked for tracked in state.tracked.values() if tracked.should_run and not tracked.failed
     ]
     return all(
-        (tracked.ready and not tracked.leaving) or tracked.state == "exited" for tracked in wanted
+        (tracked.ready and not tracked.leaving) or tracked.state == "exited" for tracked in needed
     )
 
 
 def report_progress(step: Transition) -> None:
-    """Report, once each, that everything that can start has started, and that all are ready."""
+    """Report once that all processes that can start have started, and once that all are ready."""
     _report_started(step)
     _report_ready(step)
 
@@ -254,7 +257,7 @@ def _report_started(step: Transition) -> None:
     waiting = tuple(
         name
         for name, tracked in state.tracked.items()
-        if tracked.state == "stopped" and tracked.wanted and not tracked.failed
+        if tracked.state == "stopped" and tracked.should_run and not tracked.failed
     )
     started = sum(tracked.order > 0 for tracked in state.tracked.values())
     step.notify(AllStarted(started, waiting, step.since_begin))
@@ -269,7 +272,7 @@ def _report_ready(step: Transition) -> None:
     rows = []
     for name, tracked in state.tracked.items():
         if (
-            tracked.wanted
+            tracked.should_run
             and not tracked.failed
             and (tracked.began >= begun or state.replanned == 0.0)
         ):

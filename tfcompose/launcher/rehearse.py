@@ -1,7 +1,7 @@
-"""Check of whether this machine could start its share: ``tfcompose rehearse PLAN HOST``.
+"""Check whether this machine could start its share: ``tfcompose rehearse PLAN HOST``.
 
-A deployment runs it on a host, with the unit's environment, before it changes anything. It prints
-the findings as one line of JSON.
+Before a deployment changes anything on a host, it runs this program there with the environment of
+the systemd unit. The program prints its findings as a line of JSON.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def hindrances(file: Path, host: str) -> list[Finding]:
-    """Return findings that keep the host's share of the plan from starting here."""
+    """Return findings that prevent the host's share of the plan from starting here."""
     try:
         plan = read_plan(file.read_text("utf-8"), file.name)
     except RejectedError as error:
@@ -31,7 +31,7 @@ def hindrances(file: Path, host: str) -> list[Finding]:
     share = share_of(plan, host, "")
     if isinstance(share, Finding):
         return [share]
-    trouble = ros_trouble(child_environment(os.environ, share.ros, own=True), share.ros)
+    trouble = ros_trouble(child_environment(os.environ, share.ros, is_built_in=True), share.ros)
     return (
         [trouble]
         if trouble
@@ -40,7 +40,7 @@ def hindrances(file: Path, host: str) -> list[Finding]:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Print the findings that keep the plan of PLAN_FILE HOST from starting here; return 0."""
+    """Print findings that prevent the share of HOST in PLAN_FILE from starting here; return 0."""
     file, host = argv
     findings = [
         {"code": finding.code, "message": finding.message, "help": finding.help}

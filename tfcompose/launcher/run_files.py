@@ -1,10 +1,11 @@
-"""Files of a run in its runtime directory, restored when something removes them.
+"""Files of a run in its runtime directory, restored after something removes them.
 
-They are the lock, the control socket, and the folder with the plan. The folder ``/run/user/UID``
-vanishes when the user's last session ends, unless the user lingers; cleaners remove other folders.
-Without the files, a restarting process finds no plan, and ``ps`` and ``down`` find no robot. So
-the launcher keeps their content. If it may not create the folder again, the files go to the folder
-for temporary files until it may. Commands look there, too.
+The files are the lock, the control socket, and the folder with the plan. The folder
+``/run/user/UID`` vanishes when the user's last session ends, unless the user lingers. Cleaning
+programs may remove other folders. Without the files, a restarting process finds no plan, and
+``ps`` and ``down`` find no robot. So the launcher keeps the content of the files. If it may not
+create the folder again, it writes the files to the folder for temporary files until it may.
+Commands also search there.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 class RunFiles:
     """The files of the run whose lock this process holds.
 
-    ``listener`` is the control socket; its user closes it. ``plan_file`` is the plan; the content
-    of its folder is kept if that is in the runtime directory.
+    ``listener`` is the control socket; the code that uses it closes it. ``plan_file`` is the plan.
+    The content of the plan's folder is kept if the folder is in the runtime directory.
     """
 
     def __init__(self, runtime_dir: RuntimeDir, lock: Lock, plan_file: Path) -> None:
@@ -40,12 +41,12 @@ class RunFiles:
 
     @property
     def run_id(self) -> str:
-        """The run's id."""
+        """The id of the run."""
         return self._lock.run
 
     @property
     def folder(self) -> Path:
-        """Their current folder."""
+        """The current folder of the files."""
         return self._runtime_dir.folder
 
     def keep(self, plan_file: Path) -> None:
@@ -60,12 +61,12 @@ class RunFiles:
             }
 
     def restore(self) -> bool:
-        """Restore missing files, and return whether any were missing.
+        """Restore missing files, and return whether any file was missing.
 
         Afterwards ``listener`` and ``plan_file`` are new.
 
         Raises:
-            OSError: if there is no folder for them.
+            OSError: if no folder for the files can be created.
         """
         if self._runtime_dir is not self._home and self._home.folder.parent.parent.is_dir():
             before = self._runtime_dir
@@ -120,9 +121,9 @@ class RunFiles:
 
 
 def _identity(file: Path | int) -> tuple[int, int]:
-    """Return what distinguishes a file from a later one at the same path."""
-    found = os.fstat(file) if isinstance(file, int) else file.lstat()
-    return found.st_dev, found.st_ino
+    """Return values that distinguish a file from a later file at the same path."""
+    status = os.fstat(file) if isinstance(file, int) else file.lstat()
+    return status.st_dev, status.st_ino
 
 
 def _is_same(file: Path, descriptor: int) -> bool:
@@ -133,7 +134,7 @@ def _is_same(file: Path, descriptor: int) -> bool:
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Write a missing file; a concurrent reader finds all of it or nothing."""
+    """Write a missing file atomically, so that a concurrent reader never reads part of it."""
     if file.is_file():
         return
     make_private(file.parent)

@@ -1,9 +1,10 @@
 """The runtime directory of a robot: a private folder with a lock, a control socket and the plan.
 
-A robot is one name in one ROS domain; a host's share of it has the host in its name. Its folder is
-in XDG_RUNTIME_DIR, or else in ``/run/user/UID``, or else in ``tfcompose-UID`` below the folder for
-temporary files. Logs outlive the run: they are in ROS's folder for logs (ROS_LOG_DIR, else
-ROS_HOME/log, else ~/.ros/log), in ``tfcompose/ROBOT@DOMAIN``.
+A robot is identified by its name and its ROS domain. If it runs on several hosts, the host is part
+of the name of each share. The folder is in XDG_RUNTIME_DIR, otherwise in ``/run/user/UID``,
+otherwise in ``tfcompose-UID`` below the folder for temporary files. Logs outlive the run. They are
+in ROS's log folder (ROS_LOG_DIR, otherwise ROS_HOME/log, otherwise ~/.ros/log), in
+``tfcompose/ROBOT@DOMAIN``.
 """
 
 from __future__ import annotations
@@ -26,22 +27,26 @@ if TYPE_CHECKING:
 
     from tfcompose.model.plan import Plan
 
-#: systemd makes a folder here for each logged-in user. Services and cron lack the variable, but
-#: not the folder.
+#: systemd creates a folder here for each logged-in user. Services and cron jobs lack the variable
+#: XDG_RUNTIME_DIR, but have the folder.
 USERS = Path("/run/user")
-#: Folders of logind: of logged-in users, and of users whose folder stays after a logout.
+#: logind's folders with a file for each logged-in user, and for each user whose folder stays after
+#: a logout.
 LOGGED_IN, LINGERING = Path("/run/systemd/users"), Path("/var/lib/systemd/linger")
-#: Prefix of the folder with a plan's copy.
+#: Prefix of the folder with a copy of the plan.
 _PLAN = "plan-"
 
 
 class RuntimeDirError(Exception):
-    """Raised when there is no safe folder for a run; the message is one sentence for the user."""
+    """There is no safe folder for a run; the message is a sentence for the user."""
 
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """The launcher that runs a robot: its pid, its start (seconds since 1970), the run's id."""
+    """The launcher that runs a robot.
+
+    Its pid, its start in seconds since 1970, and the run's id.
+    """
 
     pid: int
     since: float
@@ -64,7 +69,7 @@ class RuntimeDir:
 
     @property
     def share(self) -> str:
-        """The robot's name, with the host of the share, without the domain."""
+        """The robot's name with the host of the share, without the domain."""
         return self.name.rpartition("@")[0]
 
     @property
@@ -74,19 +79,22 @@ class RuntimeDir:
 
     @property
     def socket(self) -> Path:
-        """The control socket."""
+        """The path of the control socket."""
         return self.folder / "control"
 
     def plan_folder(self, digest: str) -> Path:
-        """Return where to copy a plan with its files, so that builds do not affect a run."""
+        """Return the folder for a copy of a plan and its files.
+
+        Because a run uses the copy, builds do not affect it.
+        """
         return self.folder / f"{_PLAN}{digest}"
 
     def plan_folders(self) -> list[Path]:
-        """Return the folders of the existing copies."""
+        """Return the folders of existing copies of plans."""
         return list(self.folder.glob(f"{_PLAN}*"))
 
     def holder(self) -> Holder | None:
-        """Return the launcher that runs the robot now, or None."""
+        """Return the launcher that currently runs the robot, or None."""
         try:
             descriptor = os.open(self.folder / "lock", os.O_RDWR | os.O_NOFOLLOW)
         except OSError:
@@ -98,35 +106,40 @@ class RuntimeDir:
 
 
 class Lock:
-    """One run at a time: held while this process lives, however it ends.
+    """A file lock that permits only one run of a robot at a time.
 
-    Children do not inherit it.
+    It is held until this process ends, in whatever way. Children do not inherit it.
     """
 
     def __init__(self, directory: RuntimeDir) -> None:
-        """Take the lock, or raise BlockingIOError."""
+        """Take the lock.
+
+        Raises:
+            BlockingIOError: if another process holds the lock.
+        """
         directory.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.fd = _open_lock(directory)
         self.run = f"{directory.name}:{os.urandom(6).hex()}"
         self.sign()
 
     def sign(self) -> None:
-        """Record this process as the holder, since now."""
+        """Record this process as the holder of the lock, with the current time."""
         self._holder = Holder(os.getpid(), time.time(), self.run)
         self._write_holder()
 
     def renew(self, directory: RuntimeDir) -> None:
-        """Hold the lock of that directory instead, for the same run.
+        """Take the lock of another directory instead, for the same run.
 
         Raises:
-            OSError: if it cannot be made; BlockingIOError if another process holds it.
+            OSError: if the lock file cannot be created.
+            BlockingIOError: if another process holds the lock.
         """
         before, self.fd = self.fd, _open_lock(directory)
         os.close(before)
         self._write_holder()
 
     def close(self) -> None:
-        """Release it."""
+        """Release the lock."""
         os.close(self.fd)
 
     def _write_holder(self) -> None:
@@ -135,7 +148,7 @@ class Lock:
 
 
 def _open_lock(directory: RuntimeDir) -> int:
-    """Return the descriptor of the lock once this process holds it."""
+    """Return the descriptor of the lock file, after this process has taken the lock."""
     descriptor = os.open(directory.folder / "lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
     try:
         _take(descriptor)
@@ -148,7 +161,7 @@ def _open_lock(directory: RuntimeDir) -> int:
 def _is_held(descriptor: int) -> bool:
     """Return whether a launcher runs the robot.
 
-    The check briefly shares the lock with other checks.
+    The check takes a shared lock for a moment. Other checks can share it.
     """
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -159,7 +172,11 @@ def _is_held(descriptor: int) -> bool:
 
 
 def _take(descriptor: int) -> None:
-    """Take the lock, or raise BlockingIOError; wait for processes that only check it."""
+    """Take the lock, after waiting for processes that only check it.
+
+    Raises:
+        BlockingIOError: if another process holds the lock.
+    """
     while True:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -172,7 +189,7 @@ def _take(descriptor: int) -> None:
 
 
 def _read_holder(descriptor: int) -> Holder | None:
-    for _ in range(500):  # it is written a moment after it is taken
+    for _ in range(500):  # the holder is written shortly after the lock is taken
         try:
             return msgspec.json.decode(os.pread(descriptor, 4096, 0), type=Holder)
         except (msgspec.DecodeError, UnicodeDecodeError):
@@ -181,12 +198,12 @@ def _read_holder(descriptor: int) -> Holder | None:
 
 
 def runtime_dir_of(plan: Plan, env: Mapping[str, str]) -> RuntimeDir:
-    """Return the runtime directory of the plan's robot in its domain.
+    """Return the runtime directory of the plan's robot in its ROS domain.
 
-    Creates the folder above it.
+    Create the parent folder if needed.
 
     Raises:
-        RuntimeDirError: if there is no folder that only this user can open.
+        RuntimeDirError: if there is no folder that only this user can access.
     """
     domain = str(plan.ros.domain_id) if plan.ros.domain_id is not None else domain_of(env)
     share = f"{plan.robot}.{plan.host}" if plan.host else plan.robot
@@ -199,10 +216,10 @@ def domain_of(env: Mapping[str, str]) -> str:
 
 
 def runtime_dirs(env: Mapping[str, str]) -> list[RuntimeDir]:
-    """Return every existing runtime directory that a run has used, by name.
+    """Return all existing runtime directories of runs, sorted by name.
 
     Raises:
-        RuntimeDirError: if there is no folder that only this user can open.
+        RuntimeDirError: if there is no folder that only this user can access.
     """
     base = _runtime_folder(env)
     return [
@@ -213,7 +230,7 @@ def runtime_dirs(env: Mapping[str, str]) -> list[RuntimeDir]:
 
 
 def log_folder(env: Mapping[str, str]) -> Path:
-    """Return where ROS keeps its logs."""
+    """Return ROS's log folder."""
     if env.get("ROS_LOG_DIR"):
         return Path(env["ROS_LOG_DIR"])
     return Path(env.get("ROS_HOME") or Path(env.get("HOME") or "~").expanduser() / ".ros") / "log"
@@ -241,12 +258,12 @@ def _runtime_folder(env: Mapping[str, str]) -> Path:
 
 
 def _temporary_folder() -> Path:
-    """Return the folder of runs for users without a runtime directory."""
+    """Return the folder of runs for a user without a runtime directory."""
     return Path(tempfile.gettempdir()) / f"tfcompose-{os.getuid()}"
 
 
 def substitute_of(directory: RuntimeDir) -> RuntimeDir:
-    """Return the same robot's directory to use while the user's folder is gone.
+    """Return the robot's directory to use while the user's runtime folder is missing.
 
     Raises:
         OSError: if the folder is not private to this user.
@@ -259,12 +276,12 @@ def substitute_of(directory: RuntimeDir) -> RuntimeDir:
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder, and those above it, for this user alone.
+    """Create a folder and its parents, accessible only to this user.
 
-    Leaves the system's folders for users alone.
+    The system's folders for users are not created.
 
     Raises:
-        OSError: if it cannot be made.
+        OSError: if the folder cannot be created.
     """
     for missing in reversed(
         [parent for parent in (folder, *folder.parents) if not parent.exists()]
@@ -285,7 +302,7 @@ def goes_with_logout(directory: RuntimeDir) -> bool:
 
 
 def user_name() -> str:
-    """Return this user's name, or the user id if it has no name."""
+    """Return this user's name, or the user id without a name."""
     try:
         return pwd.getpwuid(os.getuid()).pw_name
     except KeyError:
@@ -294,9 +311,11 @@ def user_name() -> str:
 
 def _is_ours(folder: Path) -> bool:
     try:
-        found = folder.lstat()
+        status = folder.lstat()
     except OSError:
         return False
     return (
-        stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+        stat.S_ISDIR(status.st_mode)
+        and status.st_uid == os.getuid()
+        and not status.st_mode & 0o077
     )

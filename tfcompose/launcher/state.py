@@ -1,6 +1,6 @@
-"""State of the process machine, and one transition of it with its actions.
+"""State of the process machine, and a transition of it with the resulting actions.
 
-Times are seconds of one monotonic clock. All values are immutable: a step replaces them.
+Times are seconds of a monotonic clock. All values are immutable; a step replaces them.
 """
 
 from __future__ import annotations
@@ -28,115 +28,115 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """Waiting times of the launcher, in seconds."""
+    """Time limits and delays of the launcher, in seconds."""
 
-    #: For the guard's report that no planned edge is published yet, in addition to the settle
-    #: time.
+    #: Limit for the guard's report that no edge of the plan is published yet, in addition to the
+    #: settle time.
     clear_s: float = 20.0
-    #: Between SIGINT and SIGTERM.
+    #: Delay between SIGINT and SIGTERM.
     interrupt_s: float = 5.0
-    #: Between SIGTERM and SIGKILL.
+    #: Delay between SIGTERM and SIGKILL.
     terminate_s: float = 5.0
-    #: Until missing edges are reported, and between two such notices.
+    #: Delay until missing edges are reported, and between two such reports.
     waiting_s: float = 5.0
-    #: Before the first restart; doubled with each further one.
+    #: Delay before the first restart. Each further restart doubles it.
     backoff_s: float = 1.0
-    #: The longest wait before a restart.
+    #: Maximum delay before a restart.
     backoff_limit_s: float = 30.0
-    #: After a run of this length, earlier failures do not count.
+    #: After a process has run for this time, its earlier failures do not count.
     steady_s: float = 10.0
-    #: For a process to become ready, if its readiness check has no timeout.
+    #: Limit for a process to become ready, if its readiness check has no timeout.
     ready_s: float = 30.0
-    #: Without a sign of life of the guard, until it is overdue.
+    #: Time without a sign of life from the guard until the guard is overdue.
     guard_silent_s: float = 10.0
-    #: From then until the guard counts as hung.
+    #: Further time until an overdue guard counts as hung.
     guard_overdue_s: float = 5.0
-    #: Two signals closer than this count as one: ``timeout`` and closing terminals send them
-    #: twice.
+    #: Signals within this time count as a single signal, because ``timeout`` and closing terminals
+    #: send signals twice.
     same_signal_s: float = 0.2
 
 
-#: The exit code when the reader of the output has gone, as a shell reports SIGPIPE.
+#: Exit code if the reader of the output has gone, like a shell's exit code for SIGPIPE.
 UNREAD = 141
 
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """One process of the plan."""
+    """The state of a process of the plan."""
 
     process: PlanProcess
     state: StateName
     pid: int | None = None
-    #: When it entered its state, or when it was sent its last signal.
+    #: Time when it entered its state or received its last signal.
     since: float = 0.0
-    #: Its place among the starts of all processes; 0: never started.
+    #: Number of its last start among the starts of all processes; 0 if it has never started.
     order: int = 0
-    #: Short runs in a row.
+    #: Number of consecutive short runs.
     failures: int = 0
-    #: Number of stop orders sent, each stronger than the one before.
+    #: Number of stop signals sent to it. Each signal is stronger than the previous one.
     level: int = 0
     ready: bool = False
-    wanted: bool = True
-    #: After its stop: "stop", it stays stopped; "again", it starts again; "drop", it is forgotten.
+    should_run: bool = True
+    #: Action after its stop: "stop" keeps it stopped, "again" starts it again, "drop" forgets it.
     leaving: Literal["", "stop", "again", "drop"] = ""
-    #: Starts after the first one.
+    #: Number of starts after the first start.
     restarts: int = 0
     began: float = 0.0
     ready_since: float | None = None
     #: The last result of its readiness check.
     observed: str = ""
-    #: True: a late readiness was reported.
+    #: Whether the launcher has reported that it is late.
     late: bool = False
     #: The reason for its state.
     detail: str = ""
-    #: The reported finding and the end of the log, if the run goes on without it.
+    #: The reported finding and the last log lines, if the process failed and the run continues.
     failed: tuple[str, ...] = ()
-    #: The parameter file with a description that its node has not read yet.
+    #: The parameter file with a new robot description that its node has not read yet.
     description: str = ""
 
     @property
     def alive(self) -> bool:
-        """Whether the process exists in the operating system, or is about to."""
+        """Whether the process exists in the operating system, or will exist in a moment."""
         return self.state in ("starting", "running", "stopping")
 
     @property
     def was_started(self) -> bool:
-        """Whether it runs or has run."""
+        """Whether the process runs or has run."""
         return self.order > 0 and self.state != "starting"
 
 
 @dataclass(frozen=True, slots=True)
 class StopReason:
-    """The reason for stopping everything."""
+    """The reason for stopping all processes."""
 
     cause: Literal["signal", "time", "taken", "failure"]
     exit_code: int
-    #: Number of signals that requested it.
+    #: Number of received signals that request the stop.
     signals: int = 0
     signalled: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """State of a running plan."""
+    """The state of a running plan."""
 
     plan: Plan
     times: Times
     tracked: dict[str, Tracked]
     guard: str | None
     begun: float | None = None
-    #: When another plan arrived; 0: never.
+    #: Time when another plan arrived; 0 if none has.
     replanned: float = 0.0
-    #: When the guard reported that no edge of the plan is published yet.
+    #: Time when the guard reported that no edge of the plan is published yet.
     clear: float | None = None
-    #: Children of the edges that were received.
+    #: Child frames of received edges.
     live: frozenset[str] = frozenset()
-    #: Children of the edges that are no longer received.
+    #: Child frames of edges that are no longer received.
     silent: frozenset[str] = frozenset()
     #: Current findings of the guard.
     findings: tuple[Finding, ...] = ()
     complete: bool = False
-    #: Codes of the errors that were shown.
+    #: Codes of the errors shown so far.
     reported: frozenset[str] = frozenset()
     #: Missing edges in the last notice.
     reminded_of: frozenset[str] = frozenset()
@@ -146,18 +146,18 @@ class State:
     stop: StopReason | None = None
     because: tuple[str, ...] = ()
     finished: bool = False
-    #: State handed to the next guard.
+    #: State of the guard, for a restarted guard.
     memory: dict[str, Any] = field(default_factory=dict)
-    #: Since when the guard is dead.
+    #: Time when the guard died.
     unwatched: float | None = None
-    #: The guard's last sign of life.
+    #: Time of the guard's last sign of life.
     guard_alive: float | None = None
-    #: Since when a sign of life is overdue.
+    #: Time since when a sign of life is overdue.
     guard_overdue: float | None = None
 
     @property
     def missing(self) -> tuple[PlanEdge, ...]:
-        """The edges not received yet; empty without a guard."""
+        """Edges that have not been received yet; empty without a guard."""
         return (
             ()
             if self.guard is None
@@ -166,7 +166,7 @@ class State:
 
     @property
     def awaited(self) -> tuple[PlanEdge, ...]:
-        """The missing edges that may still come: their owners have not failed."""
+        """Missing edges that may still come, because their owners have not failed."""
         return tuple(edge for edge in self.missing if not self.tracked[edge.owner].failed)
 
     def components_of(self, container: str) -> tuple[Tracked, ...]:
@@ -179,12 +179,12 @@ class State:
 
     @property
     def given_up(self) -> tuple[str, ...]:
-        """The failed processes without which the run goes on."""
+        """Failed processes without which the run continues."""
         return tuple(name for name, tracked in self.tracked.items() if tracked.failed)
 
 
 def initial(plan: Plan, times: Times | None = None) -> State:
-    """Return the state before ``Begin``: nothing runs."""
+    """Return the state before ``Begin``, in which no process runs."""
     processes = plan.processes
     guards = [process.name for process in processes if process.kind == "guard"]
     tracked = {}
@@ -204,7 +204,7 @@ def by_owner(edges: tuple[PlanEdge, ...]) -> tuple[tuple[str, tuple[PlanEdge, ..
 
 
 class Transition:
-    """State and actions of one step."""
+    """The state and the actions of a step."""
 
     def __init__(self, state: State, now: float) -> None:
         self.state = state
@@ -213,7 +213,7 @@ class Transition:
 
     @property
     def since_begin(self) -> float:
-        """Seconds since the launcher began."""
+        """Seconds since the launcher started processes."""
         return self.now - (self.state.begun or 0.0)
 
     def update(self, **changes: object) -> None:
@@ -221,7 +221,7 @@ class Transition:
         self.state = replace(self.state, **changes)  # type: ignore[arg-type]
 
     def track(self, name: str, tracked: Tracked) -> None:
-        """Replace the state of one process."""
+        """Replace the state of a process."""
         self.update(tracked=self.state.tracked | {name: tracked})
 
     def notify(self, notice: Notice) -> None:
@@ -231,7 +231,7 @@ class Transition:
     def enter(
         self, name: str, state: StateName, detail: str = "", **changes: float | None
     ) -> None:
-        """Put the process into the state, since now, and notify."""
+        """Set the process's state from now on, and send a notice."""
         pid = changes.pop("pid", None)
         before = self.state.tracked[name]
         entered = replace(before, state=state, since=self.now, detail=detail, failed=())
@@ -240,10 +240,10 @@ class Transition:
         self.notify(ProcessState(name, state, tracked.pid, detail))
 
     def start(self, name: str) -> None:
-        """Order the start of a process."""
+        """Start a process."""
         order = 1 + max(tracked.order for tracked in self.state.tracked.values())
         before = self.state.tracked[name]
-        self.track(name, replace(before, description=""))  # it reads its file
+        self.track(name, replace(before, description=""))  # the process reads the new file
         again = before.order > 0
         component = before.process.component
         began = self.now if component else before.began
@@ -258,13 +258,13 @@ class Transition:
             self.actions.append(Start(name))
 
     def report(self, finding: Finding) -> None:
-        """Show the finding, and remember an error."""
+        """Show the finding, and record the code of an error."""
         if finding.severity == "error":
             self.update(reported=self.state.reported | {finding.code})
         self.notify(FindingShown(finding))
 
     def fail_process(self, name: str, finding: Finding) -> None:
-        """Report that the process failed for good, and stop everything if it is required."""
+        """Report that the process has finally failed. If it is required, stop all processes."""
         tracked = self.state.tracked[name]
         if tracked.process.required is not False:
             self.fail(finding)
@@ -282,9 +282,9 @@ class Transition:
             )
 
     def fail(self, finding: Finding) -> None:
-        """Report the finding and stop everything.
+        """Report the finding and stop all processes.
 
-        Does nothing if everything stops already: further failures are consequences.
+        Do nothing if they are already stopping, because further failures are consequences.
         """
         if self.state.stop is None:
             self.report(finding)
@@ -292,7 +292,7 @@ class Transition:
             self.stop(StopReason("failure", 1), finding.label)
 
     def stop(self, stop: StopReason, reason: str) -> None:
-        """Begin to stop everything, unless that is under way."""
+        """Begin to stop all processes, unless they are already stopping."""
         if self.state.stop:
             return
         self.update(stop=stop)
@@ -302,11 +302,11 @@ class Transition:
                 self.enter(name, "stopped")
 
     def finish(self, exit_code: int) -> None:
-        """End: nothing runs any more."""
+        """End the run: no process runs any more."""
         self.update(finished=True)
         failed = [tracked for tracked in self.state.tracked.values() if tracked.failed]
         failed.sort(
             key=lambda tracked: (tracked.order == 0, tracked.since)
-        )  # what was not started waited for another
+        )  # unstarted processes last: they waited for others
         self.notify(Ended(exit_code, self.state.because or (failed[0].failed if failed else ())))
         self.actions.append(Finish(exit_code))

@@ -1,8 +1,8 @@
-"""Stop of the robot or of one process, and the end of a process: restart, failure or removal.
+"""Stop of the robot or of a process, and actions after a process ends.
 
-A process first receives its own stop signal, then SIGTERM, then SIGKILL, each if the previous one
-did not help. After its end it restarts after a delay, stays stopped until requested by name, or
-leaves the plan.
+A process first receives its own stop signal, then SIGTERM, then SIGKILL. Each signal follows if
+the previous one had no effect in time. After its end, a process restarts after a delay, or stays
+stopped until a request, or leaves the plan.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import did_you_mean
 from tfcompose.foundation.text import plural
-from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp
+from tfcompose.launcher.events import Follow, Kill, Order, OutputLost, Signalled, TimeUp
 from tfcompose.launcher.failures import (
     describe_exit,
     ended_by_itself_finding,
@@ -44,19 +44,19 @@ if TYPE_CHECKING:
 
 
 def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
-    """Return the delay in seconds before a restart after ``failures`` failures in a row."""
+    """Return the delay in seconds before a restart after ``failures`` consecutive failures."""
     if process.restart_delay is not None:
         return process.restart_delay
     return min(times.backoff_s * 2.0 ** (failures - 1), times.backoff_limit_s)
 
 
-# The end of a process.
+# End of a process.
 
 
 def take_process_exit(step: Transition, event: Exited) -> None:
-    """Handle the end of a process: expected, followed by a restart, or a failure.
+    """Handle the end of a process: an expected end, a restart, or a failure.
 
-    Components end with their container.
+    The components of a container end with it.
     """
     _take_end(step, event)
     lose_components(step, event.name)
@@ -86,7 +86,7 @@ def _take_end(step: Transition, event: Exited) -> None:
         _restart_after(step, tracked, event)
         return
     step.enter(name, "exited", how)
-    # The condition that other processes wait for is met, and outlives the process.
+    # Processes that wait for this process may start, even though it has ended.
     if done and ((before.ready and not process.owns) or (ready and ready.kind == "exit")):
         step.track(
             name,
@@ -106,7 +106,7 @@ def _take_end(step: Transition, event: Exited) -> None:
 def _is_to_end(state: State, process: PlanProcess) -> bool:
     """Return whether the process is expected to end.
 
-    Its end makes it ready, or another process waits until it is done.
+    This is so if its end makes it ready, or if another process waits until it is done.
     """
     ends = process.ready is not None and process.ready.kind == "exit"
     return ends or any(
@@ -117,7 +117,7 @@ def _is_to_end(state: State, process: PlanProcess) -> bool:
 def _take_guard_exit(step: Transition, tracked: Tracked, event: Exited) -> None:
     """Restart a guard that died.
 
-    Its reports stay valid, and the next guard receives its memory.
+    Its reports stay valid, and the next guard receives its state.
     """
     if not step.state.memory:
         lose_edges(step, tracked)
@@ -129,11 +129,12 @@ def _take_guard_exit(step: Transition, tracked: Tracked, event: Exited) -> None:
 
 
 def lose_edges(step: Transition, tracked: Tracked) -> None:
-    """Mark the edges of a process as not live: it has ended, or is about to."""
+    """Mark the edges of a process as not live, because it has ended or is about to end."""
     state, name = step.state, tracked.process.name
     step.track(name, replace(tracked, ready=False, ready_since=None, observed="", late=False))
     if name == state.guard:
-        # A strict guard's memory holds what it latched, also for one that is restarted by request.
+        # The state of a strict guard holds latched messages, which a guard restarted by request
+        # needs, too.
         memory = state.memory if state.plan.guard.mode == "strict" else {}
         step.update(live=frozenset(), complete=not state.plan.edges, memory=memory)
     elif tracked.process.owns:
@@ -148,37 +149,42 @@ def lose_edges(step: Transition, tracked: Tracked) -> None:
 def lose_components(step: Transition, container: str) -> None:
     """Handle components that ended with their container.
 
-    Those still wanted are loaded again once it is ready again.
+    A component that should run is loaded again when the container is ready again.
     """
     for tracked in step.state.components_of(container):
         if tracked.alive or tracked.state == "backoff":
             lose_edges(step, tracked)
             if (
                 not tracked.process.owns and step.state.guard is not None
-            ):  # what was ordered holds for that container
+            ):  # cancels orders for that container
                 step.actions.append(Order(Absent(tracked.process.name)))
             tracked = step.state.tracked[tracked.process.name]  # noqa: PLW2901 (the same, without its edges)
             process_left(
                 step,
                 replace(
-                    tracked, leaving=tracked.leaving or ("again" if tracked.wanted else "stop")
+                    tracked, leaving=tracked.leaving or ("again" if tracked.should_run else "stop")
                 ),
                 f"with {container}",
             )
 
 
 def process_left(step: Transition, tracked: Tracked, how: str) -> None:
-    """Handle the end of a process that was meant to end: stopped, started again, or dropped."""
+    """Handle the expected end of a process: it stays stopped, starts again, or is dropped."""
     name = tracked.process.name
     step.track(name, tracked)
     step.enter(name, "stopped", how, level=0, failures=0)
     if tracked.leaving == "drop":
         step.update(
-            tracked={other: each for other, each in step.state.tracked.items() if other != name}
+            tracked={
+                tracked_name: each
+                for tracked_name, each in step.state.tracked.items()
+                if tracked_name != name
+            }
         )
     else:
         step.track(
-            name, replace(step.state.tracked[name], leaving="", wanted=tracked.leaving == "again")
+            name,
+            replace(step.state.tracked[name], leaving="", should_run=tracked.leaving == "again"),
         )
 
 
@@ -194,9 +200,9 @@ def _restart_after(step: Transition, tracked: Tracked, event: Exited) -> None:
 def schedule_restart(
     step: Transition, tracked: Tracked, how: str, failure: Callable[[str], Finding]
 ) -> None:
-    """Schedule a restart after a delay, unless the process restarted too often.
+    """Schedule a restart after a delay, or let the process fail after too many restarts.
 
-    In that case, ``failure`` makes the finding.
+    ``failure`` returns the finding for the latter case.
     """
     name, times = tracked.process.name, step.state.times
     most = tracked.process.restart_limit
@@ -211,11 +217,11 @@ def schedule_restart(
     )
 
 
-# Requests for one process.
+# Requests about a process.
 
 
 def refusal(state: State, name: str, verb: Verb) -> str | None:
-    """Return in one sentence why the process cannot do that; None if it can."""
+    """Return a sentence why the process cannot do what ``verb`` requests, None if it can."""
     tracked = state.tracked.get(name)
     if tracked is None:
         advice = did_you_mean(name, state.tracked, f"it has {', '.join(state.tracked)}")
@@ -235,33 +241,34 @@ def refusal(state: State, name: str, verb: Verb) -> str | None:
         verb == "stop"
         and not tracked.alive
         and tracked.state != "backoff"
-        and not (tracked.state == "stopped" and tracked.wanted)
+        and not (tracked.state == "stopped" and tracked.should_run)
     ):
         return f"{name} is not running"
     return None
 
 
 def take_process_request(step: Transition, request: ProcessRequest) -> None:
-    """Stop, start or restart one process."""
+    """Stop, start or restart a process on request."""
     if refusal(step.state, request.name, request.do):
         return
     tracked = step.state.tracked[request.name]
     stays = request.do == "stop"
     if tracked.alive:
         step.track(
-            request.name, replace(tracked, leaving="stop" if stays else "again", wanted=not stays)
+            request.name,
+            replace(tracked, leaving="stop" if stays else "again", should_run=not stays),
         )
         return
     if tracked.state != "stopped":
         step.enter(request.name, "stopped", failures=0)
-    step.track(request.name, replace(step.state.tracked[request.name], wanted=not stays))
+    step.track(request.name, replace(step.state.tracked[request.name], should_run=not stays))
 
 
 # Another plan.
 
 
 def follow_plan(step: Transition, event: NewPlan) -> None:
-    """Follow another plan: stop removed processes, start new ones, restart changed ones."""
+    """Switch to another plan: stop removed processes, start new ones, restart changed ones."""
     state, plan = step.state, event.plan
     before = state.tracked
     guards = [process.name for process in plan.processes if process.kind == "guard"]
@@ -276,31 +283,40 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
         },
         live=live,
         complete=len(live) == len(plan.edges),
-        all_started=False,
-        all_ready=False,
-        reminded=step.now,
-        replanned=step.now,
     )
+    if event.changed or step.state.tracked.keys() != before.keys():
+        step.update(all_started=False, all_ready=False, reminded=step.now, replanned=step.now)
     if state.guard is not None and not before[state.guard].alive:
-        step.update(memory={}, live=frozenset())  # the next one begins anew, with the new plan
+        step.update(memory={}, live=frozenset())  # the next guard begins with an empty state
     gone = {name: tracked for name, tracked in before.items() if name not in step.state.tracked}
     for name, tracked in gone.items():
         if tracked.alive:
-            step.track(name, replace(tracked, leaving="drop", wanted=False))
-    guard = step.state.guard
+            step.track(name, replace(tracked, leaving="drop", should_run=False))
+    guard, names = step.state.guard, tuple(step.state.tracked)
     if guard is not None and guard not in event.changed and step.state.tracked[guard].alive:
         step.actions.append(Order(Reread(event.file)))
     order_descriptions(step)
-    names = tuple(step.state.tracked)
+    # After the guard, which compares what they send with the new plan.
+    followers = [name for name in names if name in event.followers and before[name].alive]
+    step.actions += [Follow(name, event.file) for name in followers]
     started = {process.name for process in (*state.plan.managed, *plan.managed)}
     changed = tuple(name for name in names if name in event.changed & started and name in before)
     added = tuple(name for name in names if name not in before)
     described = tuple(name for name in names if name in event.described & started)
-    step.notify(Replanned(changed, added, tuple(gone), event.held, described))
+    step.notify(
+        Replanned(
+            changed,
+            added,
+            tuple(gone),
+            held=event.held,
+            described=described,
+            moved=event.moved,
+        )
+    )
 
 
 def order_descriptions(step: Transition) -> None:
-    """Have the guard pass new descriptions to the running processes that do not have them yet."""
+    """Order the guard to pass new descriptions to running processes that do not have them."""
     for name, tracked in step.state.tracked.items():
         if tracked.description:
             node = tracked.process.nodes[0]
@@ -308,13 +324,15 @@ def order_descriptions(step: Transition) -> None:
 
 
 def take_description_answer(step: Transition, event: DescriptionState) -> None:
-    """Restart a process that did not take its description."""
+    """Restart a process that did not accept its new description."""
     tracked = step.state.tracked[event.process]
     if not tracked.description:
         return
     step.track(event.process, replace(tracked, description=""))
     if event.why and tracked.alive:
-        step.track(event.process, replace(tracked, description="", leaving="again", wanted=True))
+        step.track(
+            event.process, replace(tracked, description="", leaving="again", should_run=True)
+        )
         step.notify(Replanned(changed=(event.process,)))
 
 
@@ -330,7 +348,7 @@ def _take_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked
     if name not in event.changed:
         return replace(tracked, process=process)
     if tracked.alive and rests == "stopped":
-        return replace(tracked, process=process, leaving="again", wanted=True)
+        return replace(tracked, process=process, leaving="again", should_run=True)
     return Tracked(process, rests, order=tracked.order)
 
 
@@ -338,7 +356,7 @@ def _take_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked
 
 
 def stop_if_requested(step: Transition, event: Event) -> None:
-    """Begin to stop everything if the event requests it."""
+    """Begin to stop all processes if the event requests it."""
     match event:
         case DownRequest():
             step.stop(StopReason("signal", 0, 1, step.now), "tfcompose down")
@@ -373,7 +391,7 @@ def _time_up(step: Transition) -> None:
 
 
 def edge_taken(step: Transition, finding: Finding) -> None:
-    """Stop everything, because another node already publishes an edge of the plan.
+    """Stop all processes, because another node already publishes an edge of the plan.
 
     Each such edge is reported.
     """
@@ -383,13 +401,13 @@ def edge_taken(step: Transition, finding: Finding) -> None:
         step.stop(StopReason("taken", 1), finding.label)
 
 
-# Which signal is due.
+# Signals that are due.
 
 
 def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
-    """Return the process's stop signals in order: its own, SIGTERM, SIGKILL.
+    """Return the process's stop signals in order: its own signal, SIGTERM, SIGKILL.
 
-    The request to unload a component is one step, too.
+    For a component, the request to unload counts as a signal.
     """
     if process.component:
         return (Signals[process.stop.signal],)
@@ -399,13 +417,13 @@ def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
 
 
 def send_due_signals(step: Transition) -> None:
-    """Signal ending processes in reverse order of start, escalating if needed."""
+    """Signal stopping processes in reverse order of their start, and escalate if needed."""
     alive = [tracked for tracked in step.state.tracked.values() if tracked.alive]
     for name in [
         tracked.process.name for tracked in sorted(alive, key=lambda tracked: -tracked.order)
     ]:
         tracked = step.state.tracked.get(name)
-        if tracked is None or not tracked.alive:  # it went with its container
+        if tracked is None or not tracked.alive:  # it ended with its container
             continue
         level = _due_level(step.state, tracked, step.now)
         if tracked.process.component:
@@ -427,7 +445,7 @@ def send_due_signals(step: Transition) -> None:
 
 
 def _end_component(step: Transition, tracked: Tracked, level: int, container: str) -> None:
-    """Unload a component when it is due; if everything stops, it ends with its container."""
+    """Unload a component when this is due. If all processes stop, it ends with its container."""
     name, state = tracked.process.name, step.state
     if level and state.stop and state.tracked[container].state != "expected":
         step.enter(name, "stopped", f"with {container}")
@@ -438,24 +456,27 @@ def _end_component(step: Transition, tracked: Tracked, level: int, container: st
     step.enter(name, "stopping", "unloaded", pid=tracked.pid, level=1)
 
 
-def firmer_at(times: Times, tracked: Tracked) -> float | None:
-    """Return when the next signal is due, by the plan's time limit, or else the launcher's."""
+def escalate_at(times: Times, tracked: Tracked) -> float | None:
+    """Return when the next signal is due, by the plan's time limit or the launcher's."""
     if tracked.state != "stopping" or not 0 < tracked.level < len(stop_signals(tracked.process)):
         return None
     rule, kills = tracked.process.stop, tracked.level + 1 == len(stop_signals(tracked.process))
-    own = rule.kill_timeout_s if kills and rule.kill_timeout_s is not None else rule.timeout_s
+    kill_timeout_s = (
+        rule.kill_timeout_s if kills and rule.kill_timeout_s is not None else rule.timeout_s
+    )
     default = times.interrupt_s if tracked.level == 1 else times.terminate_s
-    return tracked.since + (default if own is None else own)
+    return tracked.since + (default if kill_timeout_s is None else kill_timeout_s)
 
 
 def _due_level(state: State, tracked: Tracked, now: float) -> int:
-    """Return how many of its ``stop_signals`` the process should have received by now.
+    """Return the number of ``stop_signals`` that the process should have received by now.
 
-    The first is due when nothing that waits for the process still runs, or when only this process
-    is to end. Each further one is due some time after the previous one. A second signal to the
-    launcher makes the second due at once for all processes, a third the third.
+    The first signal is due when no running process waits for this process any more, or when only
+    this process stops. Each further signal is due some time after the previous one. If the
+    launcher receives a second signal, the second stop signal is due at once for all processes; at
+    a third, the third.
     """
-    due = firmer_at(state.times, tracked)
+    due = escalate_at(state.times, tracked)
     level = tracked.level + 1 if due is not None and now >= due else tracked.level
     if level == 0 and (tracked.leaving or (state.stop and not _is_needed(state, tracked))):
         level = 1
@@ -465,10 +486,10 @@ def _due_level(state: State, tracked: Tracked, now: float) -> int:
 
 
 def _is_needed(state: State, tracked: Tracked) -> bool:
-    others = [other for other in state.tracked.values() if other.alive and other is not tracked]
+    peers = [peer for peer in state.tracked.values() if peer.alive and peer is not tracked]
     if tracked.process.name == state.guard:
-        return bool(others)
+        return bool(peers)
     return any(
-        tracked.process.name in other.process.after and other.process.name != state.guard
-        for other in others
+        tracked.process.name in peer.process.after and peer.process.name != state.guard
+        for peer in peers
     )

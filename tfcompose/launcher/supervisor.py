@@ -1,8 +1,8 @@
-"""Runs a plan: one loop turns pipes, signals and time into events and acts on them.
+"""Runs a plan: a loop turns pipes, signals and time into events, and carries out actions.
 
-The launcher has one thread. Its children lead their own sessions, so that a Ctrl-C in the terminal
-reaches only the launcher. A process that writes faster than the launcher passes on blocks on its
-own pipe; the launcher buffers nothing.
+The launcher has a single thread. Its children lead their own sessions, so Ctrl-C in the terminal
+reaches only the launcher. If a process writes faster than the launcher passes its output on, the
+process blocks on its pipe. The launcher does not buffer the output.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import msgspec
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.findings import Note
 from tfcompose.foundation.signals import take_interrupt
+from tfcompose.launcher.answers import CommandInputs
 from tfcompose.launcher.answers import answer as answer_to
 from tfcompose.launcher.child import subreaper
 from tfcompose.launcher.children import Children, GuardPipes
@@ -31,6 +32,7 @@ from tfcompose.launcher.components import writer_of
 from tfcompose.launcher.events import (
     Begin,
     Finish,
+    Follow,
     Kill,
     Notify,
     NotifyLate,
@@ -52,6 +54,7 @@ from tfcompose.model.messages import (
     Ended,
     FilesRestored,
     FindingShown,
+    Reread,
     UpdateRequest,
 )
 from tfcompose.model.plan.components import load_file
@@ -73,44 +76,44 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import Notice, Request
     from tfcompose.model.plan import Plan
 
-#: The loop checks its children at least this often, whatever signals say; seconds.
+#: Maximum interval between checks of the children, in seconds, even without signals.
 LONGEST_SLEEP_S = 1.0
-#: It checks this often whether the run's files are there; seconds.
+#: Interval between checks of the run's files, in seconds.
 FILES_CHECK_S = 0.5
 #: Signals that end a plan.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
-#: Processes that can be held before they publish.
+#: Kinds of processes that can join ROS early and wait before they publish.
 _PREPARED = ("static", "joints", "simulate")
 
 
 @dataclass(slots=True)
 class RunSession:
-    """Resources of a run on this machine besides its processes."""
+    """Resources of a run on this machine, other than its processes."""
 
     plan_file: Path
     #: The run's lock, socket and plan. With these, the run also ends processes that left their
-    #: groups.
+    #: process groups.
     files: RunFiles | None = None
-    #: The folder that the plan was built in, if ``plan_file`` is a copy.
+    #: The folder in which the plan was built, if ``plan_file`` is a copy.
     base: Path | None = None
     output: NonBlockingOutput | None = None
-    #: Called regularly, to update what is shown.
+    #: Called regularly, to update the screen.
     refresh: Callable[[], None] | None = None
-    #: Receives each notice; the run ends when its reader does.
+    #: Receives each notice. The run ends when the reader of the stream has gone.
     events: EventStream | None = None
-    #: Has imported the modules of tfcompose's own processes.
+    #: Forks tfcompose's processes; it has imported their modules.
     forker: Forker | None = None
 
     @property
     def run_id(self) -> str:
-        """The run's id; empty without files."""
+        """The id of the run; empty without files."""
         return self.files.run_id if self.files else ""
 
 
 @dataclass(frozen=True, slots=True)
 class _Environments:
-    """Inputs of commands: the launcher's environment, and a function for a process's."""
+    """The launcher's environment, and a function that returns a process's environment."""
 
     base: Mapping[str, str]
     environment: Environment
@@ -129,28 +132,28 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
 ) -> int:
     """Run the plan until it ends, and return the exit code.
 
-    0 after a clean end, 1 after a failure or a finding. SIGINT, SIGTERM and SIGHUP end it.
-    ``report`` receives every notice for the user, in order; if it raises OSError, the reader is
-    gone, and the plan ends. ``duration_s`` is the time to run in seconds, counted from the end of
-    the observation before the start. ``session`` has the run's resources on this machine besides
-    its processes. Call it in the main thread.
+    The exit code is 0 after a clean end, 1 after a failure or a finding. SIGINT, SIGTERM and
+    SIGHUP end the run. ``report`` receives every notice for the user, in order. If ``report``
+    raises OSError, the reader has gone and the run ends. ``duration_s`` is the time to run in
+    seconds, counted from the end of the observation before the start. ``session`` has the run's
+    resources on this machine other than its processes. Call this function in the main thread.
     """
     state = initial(plan, times)
     processes = [
         tracked.process for tracked in state.tracked.values() if tracked.state != "expected"
     ]
     base = os.environ if base_env is None else base_env
-    built_in = session.base if session else None
-    commands, findings = commands_of(plan, processes, plan_file, base, environment, built_in)
+    build_folder = session.base if session else None
+    commands, findings = commands_of(plan, processes, plan_file, base, environment, build_folder)
     if findings:
         for finding in findings:
             report(FindingShown(finding))
         report(Ended(1))
         return 1
     with contextlib.ExitStack() as stack:
-        known = _Environments(base, environment)
+        environments = _Environments(base, environment)
         supervisor = _Supervisor(
-            state, commands, report, session or RunSession(plan_file), known, stack
+            state, commands, report, session or RunSession(plan_file), environments, stack
         )
         return supervisor.run(duration_s)
 
@@ -162,7 +165,7 @@ class _Supervisor:
         commands: dict[str, ChildCommand],
         report: Callable[[Notice], None],
         session: RunSession,
-        known: _Environments,
+        environments: _Environments,
         stack: contextlib.ExitStack,
     ) -> None:
         self._state = state
@@ -178,7 +181,7 @@ class _Supervisor:
         self._signals = stack.enter_context(Signals())
         selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
         self._session = session
-        self._known = known
+        self._environments = environments
         self._lost_files = ""
         lost = partial(self._events.append, OutputLost())
         self._notifier = Notifier(
@@ -232,29 +235,27 @@ class _Supervisor:
         return self._exit_code
 
     def _prepare(self) -> None:
-        """Have publishers join ROS while the guard observes.
+        """Let publishers join ROS while the guard observes the tree.
 
-        If each has to import ROS first, at most one per core.
+        If each publisher has to import ROS first, prepare at most one per CPU core.
         """
         if self._state.clear is not None or self._state.stop:
             return
-        own = [
+        built_in = [
             tracked.process
             for tracked in self._state.tracked.values()
             if tracked.process.kind in _PREPARED
         ]
         at_once = None if self._session.forker else os.cpu_count()
-        for process in [process for process in own if not process.after][:at_once]:
+        for process in [process for process in built_in if not process.after][:at_once]:
             self._children.prepare(process, self._commands[process.name])
 
     def _answer(self, request: Request) -> Answer:
-        answer, event, planned = answer_to(
-            request,
-            self._state,
-            self._session.plan_file,
-            self._known.base,
-            self._known.environment,
+        session, environments = self._session, self._environments
+        inputs = CommandInputs(
+            session.plan_file, session.base, environments.base, environments.environment
         )
+        answer, event, planned = answer_to(request, self._state, inputs)
         if planned:
             self._children.dismiss()
             self._session.plan_file, self._commands = planned
@@ -274,7 +275,7 @@ class _Supervisor:
         return state.clear + duration_s
 
     def _sleep_s(self, end: float | None) -> float:
-        due = [at for at in (self._due, end) if at is not None]
+        due = [time_s for time_s in (self._due, end) if time_s is not None]
         due += [self._files_at] if self._session.files else []
         return min(LONGEST_SLEEP_S, max(0.0, min(due, default=float("inf")) - time.monotonic()))
 
@@ -300,6 +301,8 @@ class _Supervisor:
                 self._order_component(order)
             case Order(order):
                 self._children.order(order)
+            case Follow(name, file):
+                self._children.order_process(name, Reread(file))
             case NotifyLate(name, finding):
                 self._notify_late(name, finding)
             case Finish(exit_code):
@@ -308,7 +311,7 @@ class _Supervisor:
                 pass
 
     def _restore_files(self) -> None:
-        """Restore removed files of the run: a process that starts reads the plan."""
+        """Restore removed files of the run, because a starting process reads the plan."""
         session = self._session
         if session.files is None:
             return
@@ -329,8 +332,8 @@ class _Supervisor:
                 self._state.plan,
                 self._state.plan.managed,
                 session.plan_file,
-                self._known.base,
-                self._known.environment,
+                self._environments.base,
+                self._environments.environment,
                 session.base,
             )
         self._notify(FilesRestored(str(session.files.folder)))
@@ -350,7 +353,7 @@ class _Supervisor:
         )
 
     def _order_component(self, order: ComponentOrder) -> None:
-        """Write the request to the container beside the plan, and have the guard send it."""
+        """Write the request to the container next to the plan, and order the guard to send it."""
         name = order.process
         if order.do == "load":
             text = msgspec.json.encode(self._commands[name].load).decode()
@@ -363,7 +366,7 @@ class _Supervisor:
         else:
             file, text = self._loads[name]
             if not file.is_file():
-                with contextlib.suppress(OSError):  # the guard says that it cannot read it
+                with contextlib.suppress(OSError):  # the guard reports an unreadable file
                     file = self._write_request(name, text)
         self._children.order(msgspec.structs.replace(order, file=str(file)))
 
@@ -387,9 +390,9 @@ class _Supervisor:
 
 @final
 class Signals:
-    """Catches the signals that end a plan, and SIGCHLD so that it wakes the loop.
+    """Catches the signals that end a run, and SIGCHLD, which wakes the loop.
 
-    Restores the handlers afterwards. A SIGHUP that is ignored, as below ``nohup``, stays ignored.
+    Afterwards it restores the handlers. If SIGHUP is ignored, as with ``nohup``, it stays ignored.
     ``more`` are further signals to catch.
     """
 
@@ -427,12 +430,12 @@ class Signals:
         self._taken.append(number)
 
     def woken(self) -> None:
-        """Empty the pipe that woke the loop."""
+        """Empty the pipe that has woken the loop."""
         with contextlib.suppress(BlockingIOError):
             os.read(self.fd, 4096)
 
     def take(self) -> Iterator[int]:
-        """Yield the signals received since the last call, without SIGCHLD."""
+        """Yield the signals received since the previous call, without SIGCHLD."""
         while self._taken:
             number = self._taken.popleft()
             if number != signal.SIGCHLD:
@@ -441,6 +444,6 @@ class Signals:
                 self._children_changed = True
 
     def take_children_changed(self) -> bool:
-        """Return whether SIGCHLD was among the signals that the last ``take`` consumed."""
+        """Return whether SIGCHLD was among the signals that the previous ``take`` consumed."""
         changed, self._children_changed = self._children_changed, False
         return changed

@@ -12,19 +12,19 @@ from tfcompose.foundation import procfs
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-#: The processor's use is measured over this time, in seconds.
+#: CPU usage is measured over this time, in seconds.
 OVER_S = 0.2
 
 
 class UsageMeter:
-    """Measures what groups of processes use."""
+    """Measures CPU and memory usage of process groups."""
 
     def __init__(self) -> None:
         self._ticks: dict[int, int] = {}
         self._at = time.monotonic()
 
     def begin(self, groups: Collection[int]) -> dict[int, list[int]]:
-        """Measure from now on; return the processes of each group that has any."""
+        """Start a measurement, and return the processes of each non-empty group."""
         members = _members(set(groups)) if groups else {}
         self._at = time.monotonic()
         self._ticks = {pid: _ticks(pid) for pids in members.values() for pid in pids}
@@ -33,12 +33,12 @@ class UsageMeter:
     def usage(self, groups: Collection[int]) -> dict[int, tuple[float, int]]:
         """Return (cores, bytes) for each group that has processes.
 
-        The memory is proportional (PSS). The cores are averages since the last call; a process
-        that began since then counts from the next call on.
+        Memory is the proportional set size (PSS). Cores are averages since the previous call. A
+        process that started since then counts from the next call on.
         """
-        at, before = self._at, self._ticks
+        since_s, before = self._at, self._ticks
         members = self.begin(groups)
-        ticks_per_core = os.sysconf("SC_CLK_TCK") * max(self._at - at, 1e-3)
+        ticks_per_core = os.sysconf("SC_CLK_TCK") * max(self._at - since_s, 1e-3)
         used = {}
         for group, pids in members.items():
             ticks = sum(self._ticks[pid] - before.get(pid, self._ticks[pid]) for pid in pids)
@@ -47,7 +47,7 @@ class UsageMeter:
 
 
 def usage_of(groups: Collection[int]) -> dict[int, tuple[float, int]]:
-    """Return (cores, bytes) for each group that has processes; the memory is proportional."""
+    """Return (cores, bytes) for each group that has processes. Memory is PSS."""
     meter = UsageMeter()
     if not meter.begin(groups):
         return {}

@@ -1,8 +1,6 @@
-"""Values that wings hand to each other.
+"""Values that wings exchange: the robot, the plan, files to write, and messages between processes.
 
-The robot, the plan, files to be written, and messages between processes.
-
-The plan is the border: what runs on a robot knows it, and neither the compiler nor pydantic nor
-YAML. Must not import ``spec``, ``compiler``, ``tf``, ``guard``, ``launcher``, ``cli``, ``tools``,
-``pydantic``, ``yaml``.
+The plan is the border: programs that run on a robot know the plan, but not the compiler, pydantic
+or YAML. Must not import ``spec``, ``compiler``, ``tf``, ``guard``, ``launcher``, ``cli``,
+``tools``, ``pydantic``, ``yaml``.
 """

@@ -1,4 +1,4 @@
-"""Files that tfcompose writes: their text, and how they address meshes and textures."""
+"""Files that tfcompose writes, and the form in which they address meshes and textures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Form = Literal["as-written", "package", "file", "relative"]
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A file to be written: its path below the output folder, and its text."""
+    """A file to write: its path below the output folder, and its text."""
 
     path: str
     text: str
@@ -28,20 +28,20 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where files are written, relative to the robot's paths, and how they address others.
+    """The folder to write files to, and the form in which they address other files.
 
     ``as-written`` keeps addresses. ``package`` writes ``package://``, ``file`` absolute
-    ``file://``, and ``relative`` paths from the folder.
+    ``file://``, and ``relative`` paths relative to the folder.
     """
 
     form: Form = "as-written"
-    #: The folder of the written file; relative paths become relative to it.
+    #: The folder of the written file, from which relative paths start.
     folder: str = "."
-    #: The absolute folder from which relative paths begin.
+    #: The absolute folder from which the robot's relative paths start.
     top: str = "/"
 
     def address(self, asset: Asset) -> str:
-        """Return the address; one impossible in this form is kept (see ``unaddressed``)."""
+        """Return the address in this form, or the original address if this form is impossible."""
         if self.form == "package" and asset.package:
             return f"package://{asset.package}/{_quote_path(asset.inside)}"
         if self.form == "file" and asset.path:
@@ -54,7 +54,7 @@ class Target:
         return asset.uri
 
     def from_folder(self, path: str) -> str:
-        """Return the path seen from the folder of the written files."""
+        """Return the path relative to the folder of the written files."""
         begin = posixpath.join(self.top, self.folder)
         return posixpath.relpath(posixpath.join(self.top, path), begin)
 
@@ -64,10 +64,10 @@ _NOT_IN_ADDRESSES = re.compile(r"[\x00-\x20\x7f#%?]")
 
 
 def _quote_path(path: str) -> str:
-    """Return the path as an address has it: a space is %20.
+    """Return the path as part of an address: a space becomes %20.
 
-    ROS reads addresses with libcurl, which refuses spaces and takes ``#``, ``?`` and ``%`` for
-    something else. What it takes as it is stays so, since other readers decode nothing.
+    ROS reads addresses with libcurl, which rejects spaces and gives ``#``, ``?`` and ``%`` a
+    meaning. Other characters stay unchanged, because other readers do not decode addresses.
     """
     return _NOT_IN_ADDRESSES.sub(lambda match: f"%{ord(match[0]):02X}", path)
 
@@ -83,22 +83,22 @@ def assets(robot: Robot) -> Iterator[Asset]:
 
 
 def assets_without_address(robot: Robot, form: Form) -> list[Asset]:
-    """Return the files that have no address of this form: in no package, or of unknown place.
+    """Return the files that have no address in this form, without duplicates.
 
-    Each once.
+    A file lacks an address if it is in no package or its place is unknown.
     """
     if form == "as-written":
         return []
     unaddressed: dict[Asset, None] = {}
     for asset in assets(robot):
-        known = asset.package if form == "package" else asset.path
-        if not known and not _elsewhere(asset):
+        location = asset.package if form == "package" else asset.path
+        if not location and not _elsewhere(asset):
             unaddressed[asset] = None
     return list(unaddressed)
 
 
 def _elsewhere(asset: Asset) -> bool:
-    """Whether the address is for others to resolve: http, model."""
+    """Return whether other programs resolve the address, as for http and model."""
     return "://" in asset.uri and not asset.uri.startswith(("package://", "file://"))
 
 
@@ -109,10 +109,11 @@ _RELATIVE = re.compile(
 
 
 def with_absolute_addresses(urdf: str, folder: Path) -> str:
-    """Return the URDF with paths relative to ``folder`` as absolute ``file://`` addresses.
+    """Replace relative paths in the URDF by absolute ``file://`` addresses.
 
-    Who reads the description from a topic does not know that folder. Only the machine that runs
-    the plan does, so that what is built stays the same everywhere.
+    Paths are relative to ``folder``. Readers of the description on a topic do not know the folder.
+    Only the machine that runs the plan replaces the paths, so that built files are the same on
+    every machine.
     """
 
     def absolute(match: re.Match[str]) -> str:

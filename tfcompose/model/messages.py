@@ -1,8 +1,8 @@
 """Messages between the processes of a run, as lines of JSON.
 
-The guard sends events to the launcher on a pipe, and takes orders on another; its log is for
-people. Other commands send requests to the launcher's control socket. They get answers, or the
-same notices that ``up`` prints.
+The guard sends events to the launcher on a pipe and receives orders on another pipe. Its log is
+for people. Other commands send requests to the launcher's control socket. They receive answers, or
+the notices that ``up`` prints.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 from tfcompose.foundation.findings import Finding  # noqa: TC001 (msgspec needs it at run time)
 from tfcompose.model.plan import LifecycleState, ProcessKind  # noqa: TC001
 
-#: What a decoder raises for a line that is not a message.
+#: Exceptions of the decoder for a line that is not a message.
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
@@ -23,7 +23,7 @@ class ProcessMessage(msgspec.Struct, frozen=True):
 
 
 class _Event(ProcessMessage, frozen=True, tag_field="event", tag=True):
-    """An event of the guard, a notice, or both."""
+    """An event of the guard, a notice for the user, or both."""
 
 
 class _Order(ProcessMessage, frozen=True, tag_field="order", tag=True):
@@ -35,7 +35,7 @@ class Request(ProcessMessage, frozen=True, tag_field="request", tag=True):
 
 
 def line_of(message: ProcessMessage) -> bytes:
-    """Return the message as one line of JSON, newline included."""
+    """Return the message as a line of JSON with a newline."""
     return msgspec.json.encode(message) + b"\n"
 
 
@@ -43,27 +43,27 @@ def line_of(message: ProcessMessage) -> bytes:
 
 
 class Clear(_Event, frozen=True):
-    """The check before the start is over: no node publishes a planned edge."""
+    """The observation before the start has ended: no node publishes an edge of the plan."""
 
 
-class Taken(_Event, frozen=True):
-    """A planned edge was published before the start: the plan must not start, or must stop."""
+class EdgeTaken(_Event, frozen=True):
+    """A planned edge was published before the start. The plan must not start, or must stop."""
 
     found: Finding
 
 
 class Live(_Event, frozen=True):
-    """Edges, named by their children, were received from their owner for the first time."""
+    """Edges, identified by child frames, were received from their owner for the first time."""
 
     owner: str
     children: tuple[str, ...]
 
 
 class Silent(_Event, frozen=True):
-    """Live edges, named by their children, stopped arriving, or arrive again."""
+    """Live edges, identified by child frames, stopped arriving or arrive again."""
 
     children: tuple[str, ...]
-    #: Whether they arrive again.
+    #: Whether the edges arrive again.
     over: bool
 
 
@@ -74,55 +74,55 @@ class OwnerReady(_Event, frozen=True):
 
 
 class TreeComplete(_Event, frozen=True):
-    """Every edge of the plan is live. Also a notice."""
+    """Every edge of the plan is live. This is also a notice."""
 
     edges: int
-    #: Since the start; 0 from the guard, which does not know it.
+    #: Time since the start; 0 from the guard, which does not know it.
     seconds: float = 0.0
 
 
 class FindingShown(_Event, frozen=True, omit_defaults=True):
-    """Something is wrong. Also a notice, as users see it."""
+    """A fault was found. This is also a notice."""
 
     found: Finding
-    #: The plan's process that caused it, if stopping that one would help.
+    #: The process of the plan that caused it, if stopping the process would help.
     process: str = ""
 
 
 class CurrentFindings(_Event, frozen=True):
-    """Everything that is wrong now, worst first. It replaces what was sent before."""
+    """All current findings, the worst first. They replace the findings sent before."""
 
     findings: tuple[Finding, ...]
 
 
 class RecoveredShown(_Event, frozen=True):
-    """A reported fault is over; the text says which. Also a notice."""
+    """A reported fault has ended; the text names it. This is also a notice."""
 
     text: str
     #: Since the start.
     seconds: float = 0.0
 
 
-class Unfenced(_Event, frozen=True):
+class FilterBypassed(_Event, frozen=True):
     """A process of a strict plan bypasses the filter and must be stopped."""
 
     found: Finding
     process: str
-    #: Identifies it instead of ``process`` where its environment was cleared.
+    #: The process id, which identifies the process if its environment was cleared.
     pid: int = 0
 
 
 class GateState(_Event, frozen=True):
-    """The state of a process's gate, the condition that it waits for."""
+    """The state of a process's gate, the condition for its readiness."""
 
     process: str
-    #: What opened it, or what was found instead.
+    #: The observation that opened the gate, or the observed state while it is closed.
     seen: str
     is_open: bool
 
 
 class Remember(_Event, frozen=True):
-    """State for the next guard, should this one die. The launcher stores it by key, unread."""
+    """State for a new guard, in case this guard dies. The launcher stores it by key, unread."""
 
     changed: dict[str, Any]
 
@@ -131,43 +131,43 @@ LoadState = Literal["loaded", "not loaded", "unloaded"]
 
 
 class ComponentState(_Event, frozen=True):
-    """The state of a component, in answer to an order.
+    """The state of a component, as the answer to an order.
 
-    It is ``unloaded`` after an order to unload it, and if its container lost it or does not
-    answer. It is ``not loaded`` if loading failed.
+    It is ``unloaded`` after an order to unload it, or if its container lost it or does not answer.
+    It is ``not loaded`` if loading failed.
     """
 
     process: str
-    #: The number of the order that this answers.
+    #: The number of the answered order.
     number: int
     state: LoadState
-    #: Why it is not loaded; empty if it is.
+    #: The reason why it is not loaded; empty if it is loaded.
     why: str = ""
 
 
 class DescriptionState(_Event, frozen=True):
-    """The outcome of giving a node the robot's description."""
+    """The result of passing the robot description to a node."""
 
     process: str
-    #: Why the node did not take it; empty if it did.
+    #: The reason why the node did not accept it; empty if it did.
     why: str = ""
 
 
 class Alive(_Event, frozen=True):
-    """Heartbeat: the guard is watching. Sent once a second."""
+    """A sign of life of the guard, sent once a second."""
 
 
 GuardEvent = (
     Alive
     | Clear
-    | Taken
+    | EdgeTaken
     | Live
     | Silent
     | OwnerReady
     | TreeComplete
     | FindingShown
     | CurrentFindings
-    | Unfenced
+    | FilterBypassed
     | RecoveredShown
     | GateState
     | Remember
@@ -182,13 +182,13 @@ GUARD_EVENTS = msgspec.json.Decoder(GuardEvent)
 
 
 class Absent(_Order, frozen=True):
-    """A process of the plan was stopped on purpose, or ended: its silence is no fault."""
+    """A process of the plan was stopped on purpose or ended, so its silence is not a fault."""
 
     process: str
 
 
 class Present(_Order, frozen=True):
-    """A process of the plan is started or restarted: wait for its edges again."""
+    """A process of the plan starts or restarts, so the guard must wait for its edges again."""
 
     process: str
 
@@ -196,7 +196,7 @@ class Present(_Order, frozen=True):
 class Gate(_Order, frozen=True):
     """Watch a process's gate: a topic with a publisher, a service, or lifecycle states.
 
-    An empty gate removes the process's gate.
+    A gate without conditions ends the watch for the process.
     """
 
     process: str
@@ -204,31 +204,31 @@ class Gate(_Order, frozen=True):
     topic: str = ""
     #: A full name, or empty.
     service: str = ""
-    #: The lifecycle states to wait for.
+    #: Lifecycle states to wait for, by node.
     nodes: dict[str, LifecycleState] = {}
     #: Whether the guard brings the nodes to these states.
     drive: bool = False
-    #: Topics whose publishers the guard reports; other code watches their messages.
+    #: Topics whose publishers the guard reports. Other code watches their messages.
     writers: tuple[str, ...] = ()
 
 
 class ComponentOrder(_Order, frozen=True):
-    """Have a container load or unload a component; a ``ComponentState`` answers."""
+    """Have a container load or unload a component. The answer is a ``ComponentState``."""
 
     process: str
-    #: Returned in the answer.
+    #: The number to return in the answer.
     number: int
     do: Literal["load", "unload"]
-    #: Whether an earlier guard may have loaded it already.
+    #: Whether a previous guard may already have loaded it.
     again: bool = False
-    #: The parameter file with what to load.
+    #: The file with the request to load.
     file: str = ""
 
 
 class DescriptionOrder(_Order, frozen=True):
-    """Give a process's node the robot's description from its parameter file, as it is now.
+    """Pass the robot description in a process's parameter file to its node.
 
-    A ``DescriptionState`` answers it.
+    The answer is a ``DescriptionState``.
     """
 
     process: str
@@ -237,7 +237,7 @@ class DescriptionOrder(_Order, frozen=True):
 
 
 class Reread(_Order, frozen=True):
-    """Read the plan again: lines of its edges, or poses that ``static`` sends, have changed."""
+    """Read the plan again: lines of edges, or poses that ``static`` publishes, have changed."""
 
     file: str
 
@@ -249,7 +249,7 @@ GUARD_ORDERS = msgspec.json.Decoder(GuardOrder)
 
 # Notices: from the launcher to a person, and to clients of its control socket.
 
-#: supervisord's states, and that of an external process; people and programs read these words.
+#: supervisord's names of states, and a state for external processes. Users and programs read them.
 StateName = Literal[
     "stopped", "starting", "running", "backoff", "stopping", "exited", "fatal", "expected"
 ]
@@ -257,7 +257,7 @@ Stream = Literal["stdout", "stderr"]
 
 
 class LogLine(_Event, frozen=True):
-    """A line that a process wrote, without its end. A line longer than 64 KiB comes in pieces."""
+    """A line that a process wrote, without its newline. Lines longer than 64 KiB are split."""
 
     process: str
     stream: Stream
@@ -270,16 +270,16 @@ class ProcessState(_Event, frozen=True):
     process: str
     state: StateName
     pid: int | None = None
-    #: Why, if there is more to say: "exit code 3; again in 2 s".
+    #: Details about the state, such as "exit code 3; again in 2 s".
     detail: str = ""
 
 
 class OwnerLive(_Event, frozen=True):
-    """All edges of an owner were received from it."""
+    """All edges of an owner have arrived."""
 
     owner: str
     node: str
-    #: Their names, ``parent → child``.
+    #: Names of the edges, ``parent → child``.
     edges: tuple[str, ...]
     #: Since the start.
     seconds: float
@@ -289,34 +289,34 @@ class ProcessReady(_Event, frozen=True):
     """A process with its own gate is ready."""
 
     process: str
-    #: What opened the gate.
+    #: The observation that opened the gate.
     seen: str
     #: Since the start.
     seconds: float
 
 
 class AllStarted(_Event, frozen=True):
-    """Everything that can be started has been."""
+    """All processes that can start have started."""
 
-    #: The number of processes that were started.
+    #: Number of started processes.
     started: int
-    #: Processes that wait until others are ready, or done.
+    #: Processes that wait until other processes are ready or done.
     waiting: tuple[str, ...]
     #: Since the start.
     seconds: float
 
 
 class StartRow(ProcessMessage, frozen=True):
-    """When a process was started and ready, in seconds after the start."""
+    """The times when a process started and became ready, in seconds after the start."""
 
     process: str
-    #: None: the process is external.
+    #: None for an external process.
     started: float | None
     ready: float
 
 
 class AllReady(_Event, frozen=True):
-    """Every process is ready and every edge live."""
+    """Every process is ready, and every edge is live."""
 
     rows: tuple[StartRow, ...]
     #: Since the start.
@@ -326,7 +326,7 @@ class AllReady(_Event, frozen=True):
 
 
 class Replanned(_Event, frozen=True):
-    """The launcher follows a changed plan from now on. Processes are given by name."""
+    """The launcher follows a changed plan from now on. Processes are listed by name."""
 
     changed: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
@@ -335,10 +335,12 @@ class Replanned(_Event, frozen=True):
     held: tuple[str, ...] = ()
     #: Processes that get a new description while they run.
     described: tuple[str, ...] = ()
+    #: Fixed edges whose publisher sends another pose, without a restart.
+    moved: tuple[str, ...] = ()
 
 
 class Missing(ProcessMessage, frozen=True):
-    """The unpublished edges of one owner, in the plan's order."""
+    """The unpublished edges of an owner, in the order of the plan."""
 
     owner: str
     node: str
@@ -354,22 +356,22 @@ class Waiting(_Event, frozen=True):
 
 
 class FilesRestored(_Event, frozen=True):
-    """The files of the run were removed, and restored where possible."""
+    """Files of the run were removed, and restored if possible."""
 
     #: The folder with the restored files; empty if they could not be restored.
     folder: str
-    #: Why they could not be restored.
+    #: The reason why they could not be restored.
     why: str = ""
 
 
 class Stopping(_Event, frozen=True):
-    """Everything is being stopped, for this reason."""
+    """All processes are being stopped, for this reason."""
 
     reason: str
 
 
 class Ended(_Event, frozen=True):
-    """Everything has stopped. The last notice."""
+    """All processes have stopped. This is the last notice."""
 
     exit_code: int
     #: The message and notes of the first failure.
@@ -400,12 +402,12 @@ class _Timed(ProcessMessage, frozen=True):
     at: float
 
 
-def notice_line(notice: Notice, at: float) -> str:
-    """Return the notice as one line of JSON, without the newline.
+def notice_line(notice: Notice, time_s: float) -> str:
+    """Return the notice as a line of JSON without the newline.
 
-    ``at`` is its time, in seconds since 1970.
+    The key ``at`` holds ``time_s``, the time in seconds since 1970.
     """
-    data = {"event": "", "at": round(at, 3)} | msgspec.to_builtins(notice)
+    data = {"event": "", "at": round(time_s, 3)} | msgspec.to_builtins(notice)
     return msgspec.json.encode(data).decode()
 
 
@@ -418,46 +420,58 @@ def read_notice(line: bytes) -> tuple[Notice, float]:
     return NOTICES.decode(line), msgspec.json.decode(line, type=_Timed).at
 
 
-# Requests: what other commands ask of the launcher, and its answers.
+# Requests of other commands to the launcher, and its answers.
 
 Verb = Literal["stop", "start", "restart"]
 
 
 class StatusRequest(Request, frozen=True):
-    """Return the status of the run. Answered by a ``RobotStatus``."""
+    """Return the status of the run. The answer is a ``RobotStatus``."""
 
 
 class EventsRequest(Request, frozen=True):
-    """Send all notices so far, then new ones as they come. Answered by these alone."""
+    """Send all notices so far, then each new notice. There is no other answer."""
 
 
 class DownRequest(Request, frozen=True):
-    """Stop everything. Answered by ``Done``."""
+    """Stop all processes. The answer is ``Done``."""
 
 
 class ProcessRequest(Request, frozen=True):
-    """Stop, start or restart one process. Answered by ``Done``."""
+    """Stop, start or restart a process. The answer is ``Done``."""
 
     do: Verb
     name: str
 
 
 class UpdateRequest(Request, frozen=True):
-    """Follow another plan. Answered by a ``PlanChange``."""
+    """Follow another plan. The answer is a ``PlanChange``."""
 
-    #: The file of the plan.
+    #: The path of the plan.
     plan: str
-    #: The folder that it was built in.
+    #: The folder in which the plan was built.
     base: str
 
 
+class AdjustRequest(Request, frozen=True):
+    """Follow a plan that differs in poses of fixed edges. Answered by a ``PlanChange``.
+
+    Refused if it would restart a process, or if ``replaces`` does not run any more.
+    """
+
+    #: The file of the plan.
+    plan: str
+    #: The file of the plan that it was made from.
+    replaces: str
+
+
 REQUESTS = msgspec.json.Decoder(
-    StatusRequest | EventsRequest | DownRequest | ProcessRequest | UpdateRequest
+    StatusRequest | EventsRequest | DownRequest | ProcessRequest | UpdateRequest | AdjustRequest
 )
 
 
 class Refusal(ProcessMessage, frozen=True):
-    """Nothing was done, for this reason."""
+    """The request was rejected for this reason, and nothing was done."""
 
     error: str
 
@@ -466,33 +480,35 @@ class Done(ProcessMessage, frozen=True):
     """The request is accepted and being carried out."""
 
     ok: Literal[True] = True
-    #: What the process waits for before it starts.
+    #: The conditions for which the process waits before its start.
     waits: str = ""
 
 
 class PlanChange(ProcessMessage, frozen=True):
-    """The changes that another plan brings.
+    """The differences between two plans.
 
-    tf2 never forgets a fixed edge, so running listeners keep removed ones until they restart.
+    tf2 never forgets a fixed edge, so running listeners keep removed edges until they restart.
     """
 
     #: Processes that differ.
     changed: tuple[str, ...]
     #: New processes.
     added: tuple[str, ...]
-    #: Processes that are gone.
+    #: Removed processes.
     removed: tuple[str, ...]
     #: Removed fixed edges, which running listeners keep.
     held: tuple[str, ...]
     ok: Literal[True] = True
     #: Processes that get a new description while they run.
     described: tuple[str, ...] = ()
-    #: Whether the plan differs at all, even if only in line numbers of the robot file.
+    #: Whether the plans differ, even if only in line numbers of the robot file.
     differs: bool = False
+    #: Fixed edges whose publisher sends another pose, without a restart.
+    moved: tuple[str, ...] = ()
 
 
 class ProcessStatus(ProcessMessage, frozen=True):
-    """The status of one process."""
+    """The status of a process."""
 
     name: str
     kind: ProcessKind
@@ -503,9 +519,9 @@ class ProcessStatus(ProcessMessage, frozen=True):
     required: bool | None
     failed: bool
     ready: bool
-    #: What it waits for.
+    #: The conditions for which the process waits.
     waits: str
-    #: What was found instead.
+    #: The observed state, while it waits.
     seen: str
     pid: int | None
     #: In seconds.
@@ -513,9 +529,20 @@ class ProcessStatus(ProcessMessage, frozen=True):
     restarts: int
     #: The number of edges that it owns.
     edges: int
-    #: The number of these that the guard receives.
+    #: The number of its edges that the guard receives.
     live: int
     nodes: tuple[str, ...]
+
+
+class Adjustment(ProcessMessage, frozen=True):
+    """An edge whose pose was adjusted on the running robot, and how far."""
+
+    #: Its name, ``parent → child``.
+    edge: str
+    #: The distance from the built position, in metres.
+    xyz_m: float
+    #: The angle from the built orientation, in radians.
+    rot_rad: float
 
 
 class RobotStatus(ProcessMessage, frozen=True):
@@ -524,7 +551,7 @@ class RobotStatus(ProcessMessage, frozen=True):
     robot: str
     host: str | None
     launcher: int
-    #: The digest of the robot file that the plan was built from.
+    #: Digest of the robot file from which the plan was built.
     plan: str
     #: In seconds.
     uptime: float
@@ -534,5 +561,8 @@ class RobotStatus(ProcessMessage, frozen=True):
     missing: tuple[str, ...]
     silent: tuple[str, ...]
     processes: tuple[ProcessStatus, ...]
-    #: The guard's current findings, worst first.
+    #: The guard's current findings, the worst first.
     findings: tuple[Finding, ...] = ()
+    #: Overlays that are merged over the robot file.
+    overlays: tuple[str, ...] = ()
+    adjusted: tuple[Adjustment, ...] = ()

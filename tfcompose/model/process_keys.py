@@ -1,9 +1,10 @@
-"""The keys of a process, one row each: name, type, default, help, and what it is to other systems.
+"""The keys of a process, a row each: name, type, default, help, and equivalents in other systems.
 
-The language makes its models of the rows, exports write what a row says of their system, the
-import of launch files reads by the same rows, and ``up --dry-run`` shows them. What a key does to
-a process is the launcher's. Keys that are about edges, nodes or other processes (``publishes``,
-``params``, ``after``, ``ready``, …) have no row: they are no settings of a single process.
+The language derives its models from the rows. Exports write the settings that a row has for their
+system. The import of launch files reads by the same rows, and ``up --dry-run`` shows them. The
+launcher implements the effect of a key. Keys about edges, nodes or other processes (``publishes``,
+``params``, ``after``, ``ready``, …) have no row, because they are not settings of a single
+process.
 
 Sources: systemd.service(5), systemd.exec(5), systemd.kill(5), the Compose specification,
 Kubernetes' Pod v1 and Job batch/v1, and ``launch.actions.ExecuteProcess`` of ROS 2 Jazzy.
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 Way = Literal["run", "simulate", "external", "component", "container", "built-in"]
 """How a process runs, by the key that says so; built-in: one of tfcompose's own."""
-#: To which processes a key applies, if not only to those that ``run``.
+#: Ways of running for keys that apply to all processes, not only to processes with ``run``.
 ALL: tuple[Way, ...] = ("run", "simulate", "external", "component", "container", "built-in")
 NOT_OWN: tuple[Way, ...] = ("run", "simulate", "external", "component", "container")
 REMAPPED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
@@ -47,7 +48,7 @@ STARTED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-
 ENDED: tuple[Way, ...] = ("run", "simulate", "container")
 LOADED: tuple[Way, ...] = ("component",)
 OWN: tuple[Way, ...] = ("built-in",)
-#: Keys that a node takes as ROS arguments, and how they are written on a command line.
+#: Keys that become ROS arguments of a node, with their form on the command line.
 ROS_ARGUMENTS = {
     "remap": "-r FROM:=TO",
     "log_level": "--log-level LEVEL",
@@ -56,30 +57,30 @@ ROS_ARGUMENTS = {
 }
 
 
-# Types that are more than a Python type says.
+# Types with more information than a Python type.
 
 
 class Seconds(float):
-    """A time; a robot file has it with its unit."""
+    """A time in seconds. A robot file states it with a unit."""
 
     __slots__ = ()
 
 
 class Folder(str):
-    """A folder; in a robot file it is relative to that."""
+    """A folder. In a robot file, it is relative to that file."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Integer:
-    """A whole number between two, both included."""
+    """An integer within a range, including both ends."""
 
     lowest: int
     highest: int
 
 
-# What a row says of another system.
+# Equivalents of a row in another system.
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ class Exported:
 
 
 class Setting(NamedTuple):
-    """A setting in another system's words, and the section of the file that it belongs to."""
+    """A setting in the terms of another system, and its section in that system's file."""
 
     name: str
     value: Any
@@ -105,9 +106,9 @@ def _nothing(_of: Any) -> Iterable[Any]:
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """What a key is to a supervisor: its settings, and sentences about what it does not keep.
+    """Equivalents of a key in a supervisor: settings, and sentences about what is lost.
 
-    Without either, ``tfcompose.launcher.exec`` does what the key says, whoever starts that.
+    If both are empty, ``tfcompose.launcher.exec`` implements the key under any supervisor.
     """
 
     settings: Callable[[Exported], Iterable[Setting]] = _nothing
@@ -125,34 +126,31 @@ class Keyword:
     kind: KeywordKind = "text"
     #: Default: the name of the keyword.
     attribute: str = ""
-    #: The attribute of ROS 1's launch that is true where this one is ``shutdown``.
+    #: The attribute of ROS 1's launch that is true if this keyword is ``shutdown``.
     ros1: str = ""
-
-
-class PythonCode(str):
-    """A value that stands in a launch file as it is."""
-
-    __slots__ = ()
+    #: The type of the attribute in YAML.
+    type: type[str | bool | int | float] = str
 
 
 @dataclass(frozen=True, slots=True)
 class LaunchDialect:
-    """How launch expresses a key, in both directions."""
+    """Equivalents of a key in launch, in both directions."""
 
     keywords: tuple[Keyword, ...] = ()
     #: Values by keyword.
     settings: Callable[[PlanProcess], Iterable[Setting]] = _nothing
     #: Sentences about what launch does differently.
     gaps: Callable[[PlanProcess], Iterable[str]] = _nothing
-    #: Returns the key's value in the language from the keywords' values, None if it is not set. It
-    #: appends what cannot be read to the list.
+    #: Returns the key's value in the language from the keywords' values, None if not set. It
+    #: appends a message to the list for each value that it cannot read.
     read: Callable[[Mapping[str, Any], list[str]], Any] = lambda _record, _todo: None
-    #: The gaps of a process that is an included launch file; None: it has no such key.
+    #: Gaps for a process that is an included launch file, None if it cannot have the key.
     of_file: Callable[[PlanProcess], Iterable[str]] | None = None
-    #: True: launch lacks this, so it starts ``tfcompose.launcher.exec``, which does it.
+    #: Whether launch lacks this setting and starts ``tfcompose.launcher.exec``, which implements
+    #: it.
     is_external: bool = False
-    #: True: only a program that launch itself starts gets the keywords, because
-    #: ``tfcompose.launcher.exec`` does the same.
+    #: Whether only a program that launch itself starts gets the keywords, because
+    #: ``tfcompose.launcher.exec`` implements the setting.
     is_own: bool = False
 
 
@@ -165,30 +163,31 @@ class ProcessKey:
     """A key of a process."""
 
     name: str
-    #: A Python type or one of those above.
+    #: A Python type or a type of this module.
     type: Any
     default: Any = None
     help: str
     examples: tuple[Any, ...] = ()
-    #: The processes to which it applies.
+    #: Ways of running to which it applies.
     to: tuple[Way, ...] = ("run",)
-    #: Whether a driver's further processes take it from the first.
+    #: Whether a driver's additional processes inherit it from the first process.
     is_shared: bool = False
-    #: Other formats' names for it, separated by blanks, each with what to write instead.
+    #: Names of the key in other formats, separated by spaces, each with what to write instead.
     habits: tuple[tuple[str, str], ...] = ()
-    #: The lines of ``up --dry-run``, label and text; None: the value under the key's name.
-    shown: Callable[[PlanProcess], Iterable[tuple[str, str]]] | None = None
+    #: Returns the lines for ``up --dry-run``, label and text. None for a line with the key's name
+    #: and value.
+    dry_run_lines: Callable[[PlanProcess], Iterable[tuple[str, str]]] | None = None
     systemd: Dialect = field(default_factory=Dialect)
     compose: Dialect = field(default_factory=Dialect)
     kubernetes: Dialect = field(default_factory=Dialect)
     launch: LaunchDialect | None = None
 
     def value_of(self, process: PlanProcess) -> Any:
-        """Return the key's value; that of a component is in what its container loads."""
+        """Return the key's value. For a key of components, it is in the process's component."""
         return getattr(process.component if self.to == LOADED else process, self.name)
 
     def is_set(self, process: PlanProcess) -> bool:
-        """Return whether the process has another value than without the key."""
+        """Return whether the process's value differs from the value without the key."""
         if self.to == LOADED:
             return process.component is not None and self.value_of(process) != getattr(
                 _UNSET_COMPONENT, self.name
@@ -196,28 +195,32 @@ class ProcessKey:
         return bool(self.value_of(process) != getattr(_UNSET, self.name))
 
     def lines_of(self, process: PlanProcess) -> Iterable[tuple[str, str]]:
-        """Return the lines that ``up --dry-run`` has for the key, label and text."""
+        """Return the lines for the key in ``up --dry-run``, label and text."""
         if not self.is_set(process):
             return ()
-        return self.shown(process) if self.shown else ((self.name, str(self.value_of(process))),)
+        return (
+            self.dry_run_lines(process)
+            if self.dry_run_lines
+            else ((self.name, str(self.value_of(process))),)
+        )
 
 
-# Starting again.
+# Restarting.
 
-#: The delay before the first restart where none is set, in seconds; exports write it for each.
+#: Default delay before the first restart in seconds. Exports write it for every restart.
 FIRST_DELAY_S = 1.0
 
 
 def _policy(process: PlanProcess) -> RestartPolicy:
-    """Return when another supervisor starts it again: tfcompose's own after each failure.
+    """Return when another supervisor restarts the process; tfcompose's own after each failure.
 
-    No launcher ends everything there.
+    Under another supervisor, no launcher stops the robot when such a process fails.
     """
     return process.restart if process.kind == "run" else "on-failure"
 
 
 def _restart_of_unit(exported: Exported) -> Iterator[Setting]:
-    """Yield the policy; a unit of the kind that ends cannot be started again after a success."""
+    """Yield the restart policy. A oneshot unit cannot restart after a success."""
     policy = _policy(exported.process)
     always = policy == "always"
     yield Setting("Restart", "on-failure" if exported.awaited and always else policy, "Service")
@@ -309,15 +312,15 @@ def _restart_lines(process: PlanProcess) -> Iterator[tuple[str, str]]:
 
 # Stopping.
 
-#: How long a process has to end, in seconds: SIGINT and SIGTERM, five each, in the launcher's
-#: hands.
+#: Time for a process to end, in seconds: the launcher waits 5 s after SIGINT and 5 s after
+#: SIGTERM.
 STOP_S = 10.0
-#: How long launch waits for the end of a process after each signal, unless it is told.
+#: Default time in seconds that launch waits after each signal.
 _LAUNCH_STOP_S = 5.0
 
 
 def stop_s(process: PlanProcess) -> float:
-    """Return how many seconds another supervisor waits for the end of a process."""
+    """Return how long another supervisor waits for the end of a process, in seconds."""
     return STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
 
 
@@ -335,7 +338,7 @@ def _stop_of_service(exported: Exported) -> Iterator[Setting]:
 
 
 def _stop_of_pod(exported: Exported) -> Iterator[Setting]:
-    """Yield how long it has, and how it gets its signal: a kubelet sends SIGTERM alone."""
+    """Yield the time to end, and a hook for the signal, because a kubelet sends only SIGTERM."""
     signal, time_s = exported.process.stop.signal, stop_s(exported.process)
     yield Setting("terminationGracePeriodSeconds", math.ceil(time_s), "pod")
     if signal != "SIGTERM":
@@ -358,7 +361,7 @@ def _stop_gaps(process: PlanProcess) -> Iterator[str]:
 
 
 def _read_stop(record: Mapping[str, Any], todo: list[str]) -> dict[str, Seconds] | None:
-    """Return how long launch waits for an end after SIGINT, and after SIGTERM."""
+    """Return the times that launch waits after SIGINT and after SIGTERM."""
     times_s: list[float] = []
     for name in ("sigterm_timeout", "sigkill_timeout"):
         try:
@@ -386,7 +389,7 @@ def _stop_lines(process: PlanProcess) -> Iterator[tuple[str, str]]:
     yield "stop", f"{rule.signal}{timeout}{kill}"
 
 
-# The end of a process that ends all.
+# Processes whose end stops the robot.
 
 
 def _ends_alone(exported: Exported) -> Iterator[str]:
@@ -396,7 +399,7 @@ def _ends_alone(exported: Exported) -> Iterator[str]:
 
 def _shutdown(process: PlanProcess) -> Iterator[Setting]:
     if process.required:
-        yield Setting("on_exit", PythonCode("Shutdown()"))
+        yield Setting("on_exit", "shutdown")
 
 
 def _required_lines(process: PlanProcess) -> Iterator[tuple[str, str]]:
@@ -408,7 +411,7 @@ def _required_lines(process: PlanProcess) -> Iterator[tuple[str, str]]:
 
 # Output.
 
-#: Where output goes, as launch says it: its words for screen and log are others.
+#: Destinations of output in the terms of launch, whose words differ.
 _LAUNCH_OUTPUTS: dict[OutputPlace, Any] = {
     "both": "both",
     "screen": {"both": "screen"},
@@ -421,10 +424,9 @@ def _output_in_launch(process: PlanProcess) -> Iterator[Setting]:
 
 
 def _read_output(record: Mapping[str, Any], _todo: list[str]) -> OutputPlace | None:
-    """Return the place for launch's word, or for the places that a mapping names.
+    """Return the destination for launch's word or mapping.
 
-    With the word ``screen`` people want to see it: so they do by default here, and have it in the
-    log beside.
+    The word ``screen`` becomes the default, which also writes the log.
     """
     place = record.get("output")
     if place is None or isinstance(place, str):
@@ -447,7 +449,7 @@ def _terminal(process: PlanProcess) -> Iterator[Setting]:
         yield Setting("emulate_tty", value=True)
 
 
-# What it runs in.
+# Environment of a process.
 
 
 def _cwd_in_launch(process: PlanProcess) -> Iterator[Setting]:
@@ -477,7 +479,7 @@ def _read_prefix(record: Mapping[str, Any], todo: list[str]) -> list[str] | None
 
 
 def _plain(key: str, name: str, section: str = "") -> Callable[[Exported], Iterator[Setting]]:
-    """Return what yields a key's value as it is, where it is set, under another system's name."""
+    """Return a function that yields a key's value, if it is set, under another system's name."""
 
     def settings(exported: Exported) -> Iterator[Setting]:
         value = getattr(exported.process, key)
@@ -488,7 +490,7 @@ def _plain(key: str, name: str, section: str = "") -> Callable[[Exported], Itera
 
 
 def _within_pod(key: str) -> Callable[[Exported], Iterator[str]]:
-    """Return what names a key that no pod has: the process sets it, as far as it may."""
+    """Return a function that names a key that a pod lacks; the process sets it if permitted."""
 
     def gaps(exported: Exported) -> Iterator[str]:
         value = getattr(exported.process, key)
@@ -533,7 +535,7 @@ def _is_in(name: str) -> Callable[[Mapping[str, Any], list[str]], bool | None]:
     return lambda record, _todo: True if record.get(name) else None
 
 
-#: What a key of a ROS node's own program is: a word of its command.
+#: Keys of a program that is a ROS node; they become arguments of its command line.
 NODE_KEYS = (
     ProcessKey(
         name="log_level",
@@ -541,10 +543,10 @@ NODE_KEYS = (
         help="the log level of its nodes",
         to=PROGRAM,
         is_shared=True,
-        shown=_nothing,
+        dry_run_lines=_nothing,
     ),
 )
-#: What a process finds when it starts, and where its output goes.
+#: Keys about the environment of a process and the destination of its output.
 SURROUNDING_KEYS = (
     ProcessKey(
         name="env",
@@ -555,7 +557,7 @@ SURROUNDING_KEYS = (
         to=NOT_EXTERNAL,
         is_shared=True,
         habits=(("env environment additional_env", "variables are env: {NAME: value}"),),
-        shown=_nothing,
+        dry_run_lines=_nothing,
         launch=LaunchDialect(
             (Keyword("additional_env", "variables"), Keyword("env", "variables")),
             _env_in_launch,
@@ -570,7 +572,7 @@ SURROUNDING_KEYS = (
         examples=("maps",),
         to=PROGRAM,
         is_shared=True,
-        shown=lambda process: (("folder", str(process.cwd)),),
+        dry_run_lines=lambda process: (("folder", str(process.cwd)),),
         launch=LaunchDialect((Keyword("cwd"),), _cwd_in_launch, read=_read_cwd, is_own=True),
     ),
     ProcessKey(
@@ -579,7 +581,7 @@ SURROUNDING_KEYS = (
         default="both",
         help="destination of its output: the terminal of up, its log, or both",
         to=STARTED,
-        shown=_output_lines,
+        dry_run_lines=_output_lines,
         launch=LaunchDialect(
             (Keyword("output", "output"),), _output_in_launch, read=_read_output, is_own=True
         ),
@@ -590,13 +592,13 @@ SURROUNDING_KEYS = (
         default=False,
         help="true: it writes to a pseudo-terminal, by line and in colour",
         to=PROGRAM,
-        shown=_terminal_lines,
+        dry_run_lines=_terminal_lines,
         launch=LaunchDialect(
-            (Keyword("emulate_tty", "switch"),), _terminal, read=_is_in("emulate_tty")
+            (Keyword("emulate_tty", "switch", type=bool),), _terminal, read=_is_in("emulate_tty")
         ),
     ),
 )
-#: How a process is started, kept alive and ended.
+#: Keys about starting, restarting and stopping a process.
 SUPERVISION_KEYS = (
     ProcessKey(
         name="required",
@@ -606,7 +608,7 @@ SUPERVISION_KEYS = (
             "done; false: the robot goes on if it fails; default: the robot stops if it fails"
         ),
         to=KEPT_ALIVE,
-        shown=_required_lines,
+        dry_run_lines=_required_lines,
         systemd=Dialect(gaps=_ends_alone),
         compose=Dialect(gaps=_ends_alone),
         kubernetes=Dialect(gaps=_ends_alone),
@@ -625,7 +627,7 @@ SUPERVISION_KEYS = (
         to=KEPT_ALIVE,
         is_shared=True,
         habits=(("respawn", "restart: on-failure, or always, starts it again"),),
-        shown=_restart_lines,
+        dry_run_lines=_restart_lines,
         systemd=Dialect(_restart_of_unit),
         compose=Dialect(_restart_of_service),
         kubernetes=Dialect(gaps=_restarts_of_pod),
@@ -645,11 +647,11 @@ SUPERVISION_KEYS = (
         to=KEPT_ALIVE,
         is_shared=True,
         habits=(("respawn_max_retries", "how often in a row is max_restarts: 5"),),
-        shown=_nothing,
+        dry_run_lines=_nothing,
         systemd=Dialect(_limit_of_unit),
         kubernetes=Dialect(_limit_of_job),
         launch=LaunchDialect(
-            (Keyword("respawn_max_retries", "number"),),
+            (Keyword("respawn_max_retries", "number", type=int),),
             _respawn_limit,
             read=_read_respawn_limit,
             of_file=_nothing,
@@ -662,10 +664,10 @@ SUPERVISION_KEYS = (
         to=KEPT_ALIVE,
         is_shared=True,
         habits=(("respawn_delay", "how long after its end is restart_delay: 2 s"),),
-        shown=_nothing,
+        dry_run_lines=_nothing,
         systemd=Dialect(_delay_of_unit),
         launch=LaunchDialect(
-            (Keyword("respawn_delay", "number"),),
+            (Keyword("respawn_delay", "number", type=float),),
             _respawn_delay,
             read=_read_respawn_delay,
             of_file=_nothing,
@@ -679,7 +681,7 @@ SUPERVISION_KEYS = (
         examples=(["nice", "-n", "10"],),
         to=PROGRAM,
         habits=(("launch_prefix", "a program that runs it is prefix: [nice, -n, '10']"),),
-        shown=_nothing,
+        dry_run_lines=_nothing,
         launch=LaunchDialect(
             (Keyword("prefix", attribute="launch-prefix"),),
             _prefix_in_launch,
@@ -701,13 +703,13 @@ SUPERVISION_KEYS = (
             ),
             ("priority sched_priority", "a real-time priority is schedule: {priority: 80}"),
         ),
-        shown=_schedule_lines,
+        dry_run_lines=_schedule_lines,
         launch=LaunchDialect(is_external=True),
     ),
     ProcessKey(
         name="oom_score_adj",
         type=Integer(-1000, 1000),
-        help="preference of the kernel to kill it if memory runs out: 1000 first, -1000 never; "
+        help="from 1000 (the kernel kills it first if memory runs out) to -1000 (never); "
         "default: the launcher's",
         examples=(500,),
         to=NOT_EXTERNAL,
@@ -744,12 +746,12 @@ SUPERVISION_KEYS = (
                 "the time from SIGTERM to SIGKILL is stop: {kill_timeout: 10 s}",
             ),
         ),
-        shown=_stop_lines,
+        dry_run_lines=_stop_lines,
         systemd=Dialect(_stop_of_unit),
         compose=Dialect(_stop_of_service),
         kubernetes=Dialect(_stop_of_pod),
         launch=LaunchDialect(
-            (Keyword("sigterm_timeout"), Keyword("sigkill_timeout")),
+            (Keyword("sigterm_timeout", type=float), Keyword("sigkill_timeout", type=float)),
             _stop_in_launch,
             _stop_gaps,
             _read_stop,
@@ -757,15 +759,15 @@ SUPERVISION_KEYS = (
     ),
 )
 PROCESS_KEYS = (*NODE_KEYS, *SURROUNDING_KEYS, *SUPERVISION_KEYS)
-#: What a container is told about a component that it loads.
+#: Options for a container about a component that it loads.
 EXTRA_ARGUMENTS = ProcessKey(
     name="extra_arguments",
     type=dict[str, Any],
     default={},
-    help="options for the container, about the component",
+    help="options that the container applies when it loads the component",
     examples=({"use_intra_process_comms": True},),
     to=LOADED,
-    shown=_extra_lines,
+    dry_run_lines=_extra_lines,
     launch=LaunchDialect(
         (Keyword("extra_arguments", "parameters", attribute="extra_arg"),),
         _extra_in_launch,
@@ -775,7 +777,7 @@ EXTRA_ARGUMENTS = ProcessKey(
 
 
 def launch_keywords(*kinds: KeywordKind) -> tuple[Keyword, ...]:
-    """Return the keywords of launch that hold values of these kinds, in the rows' order."""
+    """Return launch's keywords for values of these kinds, in the order of the rows."""
     dialects = (key.launch for key in (*PROCESS_KEYS, EXTRA_ARGUMENTS) if key.launch)
     return tuple(
         keyword for dialect in dialects for keyword in dialect.keywords if keyword.kind in kinds

@@ -1,25 +1,23 @@
-"""Environment variables through which the launcher configures its processes."""
+"""Environment variables by which the launcher configures its processes."""
 
-#: Every process of a run carries its id, ROBOT@DOMAIN:ID, and so do its children.
+#: The id of the run, ROBOT@DOMAIN:ID. Every process of a run and its children have this variable.
 RUN_ID = "TFCOMPOSE_RUN"
-#: The process of the plan that it belongs to.
+#: The name of the process in the plan.
 PROCESS = "TFCOMPOSE_PROCESS"
-#: The launcher of the run: its process number, and when it began (clock ticks).
+#: The launcher of the run: its process id, and its start in clock ticks.
 LAUNCHER = "TFCOMPOSE_LAUNCHER"
-#: The descriptor of the pipe for what the guard tells the launcher.
+#: The descriptor of the pipe for events from the guard to the launcher.
 EVENTS_FD = "TFCOMPOSE_EVENTS_FD"
-#: The descriptor of the pipe for what the launcher tells the guard.
+#: The descriptor of the pipe for what the launcher tells the guard, or ``static``.
 ORDERS_FD = "TFCOMPOSE_ORDERS_FD"
-#: The descriptor of what the guard before this one left, in JSON; see ``tfcompose.guard.channel``.
+#: The descriptor of the previous guard's state as JSON; see ``tfcompose.guard.channel``.
 MEMORY_FD = "TFCOMPOSE_MEMORY_FD"
-#: For how many seconds the guard is to look before it says that all is clear.
+#: Duration of the guard's observation before it reports that all is clear, in seconds.
 SETTLE = "TFCOMPOSE_SETTLE_S"
-#: Set for a guard that joins a plan that runs already: nobody was there before the start, as it
-#: sees it.
+#: Set for a guard that joins a running plan. It treats no publisher as present before the start.
 JOINS = "TFCOMPOSE_GUARD_JOINS"
-#: Set for a guard where the processes of its run are fenced off by remapping.
+#: Set for a guard if remapping isolates the processes of its run.
 REMAPPED = "TFCOMPOSE_REMAPPED"
-#: The descriptor from which a publisher that is held before it joins ROS reads the word to go on,
-#: ``GO``.
+#: The descriptor from which a held publisher reads ``GO``, the message to continue.
 HOLD_FD = "TFCOMPOSE_HOLD_FD"
 GO = b"go\n"

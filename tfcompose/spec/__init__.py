@@ -1,6 +1,6 @@
 """The robot file as the user wrote it.
 
-YAML with the place of every value, and the language as pydantic models.
+``load`` reads YAML with the place of every value. ``language`` has the pydantic models.
 
 Must not import ``compiler``, ``tf``, ``guard``, ``launcher``, ``cli``, ``tools``, ``rclpy``.
 """

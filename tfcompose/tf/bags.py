@@ -1,4 +1,4 @@
-"""Recorded TF: MCAP and rosbag2 SQLite, read with rosbags, without ROS."""
+"""Recorded TF: MCAP and rosbag2 SQLite files, read with rosbags, without ROS."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tfcompose.tf.tf2 import Buffer, TransformException
 from tfcompose.tf.tf2.pose_buffer import CACHE_NS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
     from datetime import date
 
     from typing_extensions import Self
@@ -32,20 +32,21 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.tf_codec import Row
 
     Topics = tuple[str, str]
+    Rewrite = Callable[[Iterator["RecordedMessage"]], Iterator["RecordedMessage"]]
 
 CLOCK = "rosgraph_msgs/msg/Clock"
-#: In CDR: four bytes of header, then seconds and nanoseconds.
+#: A time as CDR: after a header of four bytes, seconds and nanoseconds.
 _CLOCK, _CLOCK_BYTES = Struct("<iI"), 12
 _SECOND_NS = 1_000_000_000
 ENDINGS = {".mcap", ".db3"}
-#: Maximum number of topics named if the requested ones are missing.
+#: Maximum number of topics that an error lists if the requested topics are missing.
 _NAMED_AT_MOST = 12
 
 
 class BagError(Exception):
-    """Raised when a bag cannot be read.
+    """A bag cannot be read.
 
-    The message is one sentence for the user; ``help`` is the advice.
+    The message is a sentence for the user; ``help`` is the advice.
     """
 
     def __init__(self, message: str, advice: str = "") -> None:
@@ -55,22 +56,22 @@ class BagError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class RecordedMessage:
-    """One TFMessage of a bag."""
+    """A TFMessage from a bag."""
 
-    #: The pair (moving, fixed) that has the message's topic.
+    #: The pair of topics (moving, fixed) that includes the message's topic.
     topics: Topics
-    #: None: it cannot be decoded.
+    #: The transforms, None for an undecodable message.
     rows: Sequence[Row] | None
-    #: True: it is on the topic of fixed edges.
+    #: Whether it is on the topic of fixed edges.
     static: bool
-    #: When it was recorded.
+    #: Time of the recording, in nanoseconds since the epoch.
     received_ns: int
-    #: The newest time on /clock at that time; None: none was recorded.
+    #: The newest time on /clock at that time, None without a recorded /clock.
     clock_ns: int | None = None
 
 
 def missing_rosbags() -> str | None:
-    """Return None if bags can be read, else one sentence that says what to install."""
+    """Return a sentence that tells what to install, None if bags can be read."""
     if find_spec("rosbags") is not None:
         return None
     return (
@@ -80,10 +81,10 @@ def missing_rosbags() -> str | None:
 
 
 class TypedMessage(NamedTuple):
-    """One message of any type, as bytes."""
+    """A message of any type, as bytes."""
 
     topic: str
-    #: As in the graph: ``sensor_msgs/msg/Imu``.
+    #: The type as in the ROS graph: ``sensor_msgs/msg/Imu``.
     type: str
     data: bytes
 
@@ -91,11 +92,11 @@ class TypedMessage(NamedTuple):
 class Recording:
     """A bag: a folder, or a single .mcap or .db3 file.
 
-    A folder without metadata.yaml is read file by file. ``end_ns`` is when the last message of any
-    topic was recorded, 0 until it has been read.
+    If a folder has no metadata.yaml, its files are read one by one. ``end_ns`` is the time of the
+    last message on any topic, and 0 until that message has been read.
 
     Raises:
-        BagError: if there is none.
+        BagError: if there is no bag.
     """
 
     def __init__(self, path: str) -> None:
@@ -105,10 +106,10 @@ class Recording:
         self._clock_ns: int | None = None
 
     def first_day(self) -> date | None:
-        """Return the day, in UTC, of the first message; None: there are no messages.
+        """Return the day of the first message in UTC, None for a bag without messages.
 
         Raises:
-            BagError: if it is not a bag, or damaged.
+            BagError: if it is not a bag, or is damaged.
         """
         from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
 
@@ -127,25 +128,25 @@ class Recording:
         """Yield the messages of the pairs of topics (moving, fixed) in recorded order.
 
         Raises:
-            BagError: if the bag has none of the topics, is not a bag or damaged, or its messages
+            BagError: if the bag has none of the topics, is not a bag, is damaged, or its messages
                 have another type.
         """
         from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
 
         decoder = Decoder()
         pair_of = {topic: pair for pair in pairs for topic in pair}
-        others: set[tuple[str, str]] = set()
-        found = False
+        recorded: set[tuple[str, str]] = set()
+        has_any = False
         for file in self._files:
             try:
                 with Reader(file) as reader:
-                    wanted = [each for each in reader.connections if _is_tf(each, pair_of)]
-                    others |= {(each.topic, each.msgtype) for each in reader.connections}
-                    found = found or bool(wanted)
+                    tf_connections = [each for each in reader.connections if _is_tf(each, pair_of)]
+                    recorded |= {(each.topic, each.msgtype) for each in reader.connections}
+                    has_any = has_any or bool(tf_connections)
                     self.end_ns = (
                         max(self.end_ns, reader.end_time) if reader.message_count else self.end_ns
                     )
-                    for connection, received_ns, data in self._with_clock(reader, wanted):
+                    for connection, received_ns, data in self._with_clock(reader, tf_connections):
                         pair = pair_of[connection.topic]
                         rows = _rows(decoder, bytes(data))
                         yield RecordedMessage(
@@ -155,36 +156,39 @@ class Recording:
                 raise
             except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
                 raise damage_error(str(file), error) from None
-        if not found:
-            raise _no_topic(self.path, pairs, others)
+        if not has_any:
+            raise _no_topic(self.path, pairs, recorded)
 
     def messages_of_types(self, types: Collection[str]) -> Iterator[TypedMessage]:
         """Yield the messages of these types on all topics, in recorded order.
 
         Raises:
-            BagError: if it is not a bag, or damaged.
+            BagError: if it is not a bag, or is damaged.
         """
         from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
 
         for file in self._files:
             try:
                 with Reader(file) as reader:
-                    wanted = [each for each in reader.connections if each.msgtype in types]
-                    if not wanted:
+                    connections = [each for each in reader.connections if each.msgtype in types]
+                    if not connections:
                         continue
-                    for connection, _, data in reader.messages(connections=wanted):
+                    for connection, _, data in reader.messages(connections=connections):
                         yield TypedMessage(connection.topic, connection.msgtype, bytes(data))
             except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
                 raise damage_error(str(file), error) from None
 
-    def _with_clock(self, reader: Any, wanted: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
-        """Yield the messages of these connections, and record /clock between them."""
+    def _with_clock(self, reader: Any, connections: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
+        """Yield the messages of these connections.
+
+        Record the time from /clock between the messages.
+        """
         clocks = [
             each for each in reader.connections if (each.topic, each.msgtype) == ("/clock", CLOCK)
         ]
-        if not wanted:
+        if not connections:
             return
-        for connection, received_ns, data in reader.messages(connections=[*wanted, *clocks]):
+        for connection, received_ns, data in reader.messages(connections=[*connections, *clocks]):
             if connection not in clocks:
                 yield connection, received_ns, data
             elif len(data) >= _CLOCK_BYTES:
@@ -193,17 +197,21 @@ class Recording:
 
 
 class BagFeed:
-    """Feeds a bag's messages to the observers of pairs of topics (moving, fixed).
+    """Feeds the messages of a bag to the observers of pairs of topics (moving, fixed).
 
-    Topics may be missing as long as the bag has one of them.
+    The bag must have at least one of the topics. ``rewrite`` returns the messages that replace the
+    recorded messages.
 
     Raises:
         BagError: if there is no bag.
     """
 
-    def __init__(self, path: str, observers: Mapping[Topics, TreeObserver]) -> None:
+    def __init__(
+        self, path: str, observers: Mapping[Topics, TreeObserver], rewrite: Rewrite = iter
+    ) -> None:
         self._recording = Recording(path)
         self._observers = observers
+        self._rewrite = rewrite
 
     def __enter__(self) -> Self:
         """Begin; files are opened as they are read."""
@@ -213,15 +221,15 @@ class BagFeed:
         """End."""
 
     def take(self, timeout_s: float, stop: Stop) -> bool:
-        """Pass the whole bag to the observers, and note its end.
+        """Pass the entire bag to the observers, and record its end.
 
-        Returns False: there are no more messages.
+        Return False, because there are no more messages.
 
         Raises:
             BagError: if the bag cannot be read.
         """
         del timeout_s
-        for each in self._recording.messages(*self._observers):
+        for each in self._rewrite(self._recording.messages(*self._observers)):
             observer = self._observers[each.topics]
             if each.rows is None:
                 observer.take_malformed(None)
@@ -243,16 +251,16 @@ class BagFeed:
         return False
 
     def elsewhere(self) -> tuple[str, ...]:
-        """Return no topics: a bag with TF only on other topics is rejected with their names."""
+        """Return no topics. A bag with TF only on other topics raises an error that names them."""
         return ()
 
 
 def echo_bag(path: str, query: PoseQuery, on_pose: OnPose) -> NoPose | None:
-    """Pass poses of a bag to ``on_pose`` as they were recorded.
+    """Pass poses from a bag to ``on_pose`` in recorded order.
 
-    With ``once`` it is the first one, with an ``at_ns`` other than 0 the one at that time, else
-    ``rate`` of them for each second of the recording. Return None if there was one, else the
-    reason.
+    With ``once``, this is the first pose. With an ``at_ns`` other than 0, it is the pose at that
+    time. Otherwise there are ``rate`` poses for each second of the recording. Return None if there
+    was a pose, otherwise the reason.
 
     Raises:
         BagError: if the bag cannot be read.
@@ -264,14 +272,14 @@ def echo_bag(path: str, query: PoseQuery, on_pose: OnPose) -> NoPose | None:
         replay.take(each.rows, static=each.static)
         if replay.is_done(each.received_ns):
             return None
-        # The buffer forgets: later on it could only say that this was too long ago.
+        # The buffer drops old samples. Later it could only report that the time is too old.
         if 0 < query.at_ns < replay.newest_ns - CACHE_NS // 2:
             break
     return replay.explain_end()
 
 
 class _Replay:
-    """The buffer at a time of the recording, and the poses returned until then."""
+    """The buffer during the replay of a recording, and the poses passed on so far."""
 
     def __init__(self, query: PoseQuery, on_pose: OnPose) -> None:
         self.newest_ns = 0
@@ -291,7 +299,7 @@ class _Replay:
             )
 
     def is_done(self, now_ns: int) -> bool:
-        """Give the pose when it is due, and return whether it was the last one."""
+        """Pass on the pose if it is due. Return whether it was the last."""
         query = self._query
         if query.at_ns < 0 or now_ns < self._next_ns:
             return False
@@ -306,7 +314,7 @@ class _Replay:
         return query.once or query.at_ns > 0
 
     def explain_end(self) -> NoPose | None:
-        """Return None if there was a pose by the end, else the reason."""
+        """Return None if a pose was passed on, otherwise the reason."""
         if self._gave:
             return None
         try:
@@ -327,13 +335,13 @@ def _rows(decoder: Decoder, data: bytes) -> Sequence[Row] | None:
         return None
 
 
-def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
-    """Return whether the connection is a wanted topic with TF.
+def _is_tf(connection: Any, topics: Mapping[str, Topics]) -> bool:
+    """Return whether the connection is a requested topic with TF.
 
     Raises:
         BagError: if its topic has a TF name but another type.
     """
-    if connection.topic not in wanted or connection.msgtype != TF_MESSAGE:
+    if connection.topic not in topics or connection.msgtype != TF_MESSAGE:
         return False
     if connection.digest.startswith("RIHS01_") and connection.digest != TF_MESSAGE_HASH:
         message = (
@@ -349,17 +357,17 @@ def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
 
 
 def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) -> BagError:
-    """Return the error for a bag without the topics: it names the TF topics that the bag has."""
+    """Return the error for a bag without the topics, which names the bag's TF topics."""
     requested = [topic for pair in pairs for topic in pair]
     for topic, type_ in sorted(held):
         if topic in requested:
             return BagError(f"{topic} in {path} is {type_}, not {TF_MESSAGE}", _help_of(type_))
-    others = sorted(topic for topic, type_ in held if type_ == TF_MESSAGE)
-    if others:
-        names = ", ".join(others[:_NAMED_AT_MOST])
+    tf_topics = sorted(topic for topic, type_ in held if type_ == TF_MESSAGE)
+    if tf_topics:
+        names = ", ".join(tf_topics[:_NAMED_AT_MOST])
         return BagError(
             f"{path} has neither {' nor '.join(requested)}",
-            f"TF is on {names}: {namespace_options(others)}",
+            f"TF is on {names}: {namespace_options(tf_topics)}",
         )
     names = ", ".join(sorted({topic for topic, _ in held})[:_NAMED_AT_MOST])
     return BagError(f"{path} holds no TF", f"it holds {names}" if names else "it is empty")
@@ -376,10 +384,10 @@ def _help_of(type_: str) -> str:
 def _files_at(path: Path) -> list[Path]:
     """Return the files to read, in order.
 
-    A folder with its metadata, a file, or the files of a folder.
+    The path is a folder with metadata, a single file, or a folder with files.
 
     Raises:
-        BagError: if nothing is there, or nothing is a bag.
+        BagError: if the path does not exist or is not a bag.
     """
     if path.name == "metadata.yaml":
         path = path.parent
@@ -389,10 +397,10 @@ def _files_at(path: Path) -> list[Path]:
         if is_file(path / "metadata.yaml"):
             return [path]
         try:
-            there = [path / name for name in names_in(path)]
+            entries = [path / name for name in names_in(path)]
         except RejectedError as error:
             raise BagError(f"{path} {error.findings[0].message}") from None
-        files = sorted((file for file in there if file.suffix in ENDINGS), key=_in_order)
+        files = sorted((file for file in entries if file.suffix in ENDINGS), key=_in_order)
         if not files:
             advice = "name the folder that ros2 bag record wrote; it has a metadata.yaml"
             raise BagError(f"{path} has no metadata.yaml and holds no recording", advice)
@@ -413,7 +421,7 @@ def _files_at(path: Path) -> list[Path]:
 
 
 def _in_order(file: Path) -> list[tuple[int, str]]:
-    """Return a key that sorts names by the numbers in them, as in the parts of a split bag."""
+    """Return a sort key that compares the numbers in names, as in the parts of a split bag."""
     return [_order_of(part) for part in re.split(r"(\d+)", file.name)]
 
 
@@ -433,7 +441,7 @@ def damage_error(path: str, error: Exception) -> BagError:
         and not isinstance(error, OSError)
         and not type(error).__module__.startswith("rosbags")
     ):
-        reason = (  # what the library did not expect, such as a size beyond all bounds
+        reason = (  # errors that rosbags does not expect, such as a huge size
             f"it is damaged ({reason})"
         )
         advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"

@@ -1,7 +1,7 @@
-"""Common start of tfcompose's own processes: arguments, signals, plan, release and output.
+"""Common start of tfcompose's processes: arguments, signals, plan, readiness and output.
 
-Publishers and the guard are such processes: ``tfcompose KIND PLAN_FILE PROCESS_NAME``. This
-module imports no ROS.
+Publishers and the guard are such processes: ``tfcompose KIND PLAN_FILE PROCESS_NAME``. This module
+imports no ROS.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan.file import read_plan
-from tfcompose.model.variables import GO, HOLD_FD, JOINS, MEMORY_FD
+from tfcompose.model.variables import GO, HOLD_FD, JOINS, MEMORY_FD, ORDERS_FD
 from tfcompose.tf.ros.environment import RosError, child_environment, missing_ros
 from tfcompose.tf.ros.network import FirstNetwork
 
@@ -33,8 +33,8 @@ _CHECK_EVERY_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Own:
-    """One of the plan's processes, as it runs."""
+class OwnProcess:
+    """A process of the plan, as this program runs it."""
 
     plan: Plan
     process: PlanProcess
@@ -44,19 +44,19 @@ class Own:
 
     @property
     def node_name(self) -> str:
-        """The last part of its node's full name."""
+        """The last part of the node's full name."""
         return self._full_name.rpartition("/")[2]
 
     @property
     def namespace(self) -> str:
-        """The rest of its node's full name: empty, or with a leading slash."""
+        """The node's namespace: empty, or with a leading slash."""
         return self._full_name.rpartition("/")[0]
 
     @property
     def ros_args(self) -> list[str]:
-        """The ROS arguments of its node.
+        """The ROS arguments of the node.
 
-        Those of the command line come first, then the plan's remappings.
+        Arguments from the command line come first, then the plan's remappings.
         """
         return [
             *self.extra_ros_args,
@@ -74,12 +74,21 @@ class Own:
 
     @property
     def is_of_several_computers(self) -> bool:
-        """Whether a process of its robot names a computer."""
+        """Whether any process of the robot names a computer."""
         return any(process.host for process in self.plan.processes)
+
+    def reread(self, file: str) -> OwnProcess:
+        """Return the same process of the plan in another file.
+
+        Raises:
+            RejectedError: with a TF902 finding, if there is no such plan or process.
+        """
+        arguments = [file, self.process.name, "--ros-args", *self.extra_ros_args]
+        return read_own(arguments, self.process.kind)
 
     @property
     def description(self) -> Path:
-        """The file that becomes ``robot_description``; it is beside the plan."""
+        """The file with the ``robot_description``, next to the plan."""
         return self.file.parent / (self.process.description or self.plan.description)
 
     @property
@@ -88,38 +97,40 @@ class Own:
 
 
 def say(line: str) -> None:
-    """Write a line of output at once."""
+    """Write a line of output immediately."""
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 
 
-def start(argv: Sequence[str], kind: str, role: Callable[[Own, Stop], None]) -> int:
-    """Run the process that ``argv`` names until a signal comes, and return the exit code.
+def start(argv: Sequence[str], kind: str, role: Callable[[OwnProcess, Stop], None]) -> int:
+    """Run the process that ``argv`` names until a signal arrives, and return the exit code.
 
-    ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. ``role`` is the body of
-    the process. It imports ROS, which takes a third of a second, only when it is called. Signals
-    are handled by then, so an interrupted process ends without a traceback. It calls
-    ``wait_for_go`` before its first message. For a robot on several computers, a process that
-    began without a network leaves ROS once there is one, and starts over in the same process.
+    ``argv`` is PLAN_FILE PROCESS_NAME, optionally followed by ``--ros-args …``. ``role`` is the
+    body of the process. It imports ROS only when called, because that takes a third of a second.
+    By then signals are handled, so an interrupted process ends without a traceback. It calls
+    ``wait_for_go`` before its first message. If a robot uses several computers and the process
+    started without a network, it leaves ROS as soon as there is a network, and starts again in the
+    same process.
 
     Returns:
-        0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
+        0 if a signal ended it, 1 if ROS is missing or unusable, 2 if the arguments or the plan are
+        invalid.
     """
     with Stop() as stop:
         try:
-            own = read_own(argv, kind)
+            process = read_own(argv, kind)
         except RejectedError as error:
             return _fail(error, 2)
         missing = missing_ros()
         if missing:
             return _fail(missing, 1)
-        os.environ.update(child_environment(os.environ, own.plan.ros, own=True))
+        os.environ.update(child_environment(os.environ, process.plan.ros, is_built_in=True))
         if stop.requested:
             return 0
         network = FirstNetwork(stop)
         try:
-            with network if own.is_of_several_computers else contextlib.nullcontext():
-                role(own, stop)
+            with network if process.is_of_several_computers else contextlib.nullcontext():
+                role(process, stop)
         except RosError as error:
             return _fail(error, 1)
     if network.came:
@@ -130,17 +141,17 @@ def start(argv: Sequence[str], kind: str, role: Callable[[Own, Stop], None]) -> 
     return 0
 
 
-def read_own(argv: Sequence[str], kind: str) -> Own:
-    """Return the process of that kind that ``argv`` names, with its plan.
+def read_own(argv: Sequence[str], kind: str) -> OwnProcess:
+    """Return the process that ``argv`` names, which must be of this kind, with its plan.
 
     Raises:
         RejectedError: with a TF902 finding, if there is no such plan or process.
     """
     arguments = list(argv)
-    at = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
-    if at != _ARGUMENTS:
+    end = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
+    if end != _ARGUMENTS:
         raise _unfit(f"usage: tfcompose {kind} PLAN_FILE PROCESS_NAME [--ros-args …]", "")
-    file, name = arguments[:at]
+    file, name = arguments[:end]
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
     except (OSError, UnicodeDecodeError) as error:
@@ -153,12 +164,12 @@ def read_own(argv: Sequence[str], kind: str) -> Own:
         raise _unfit(f"process {name} is of kind {process.kind}, not {kind}", file)
     if kind == "simulate" and process.simulate is None:
         raise _unfit(f"process {name} does not say what to simulate", file)
-    ros_args = tuple(arguments[at + 1 :])
-    return Own(_with_clock(plan, ros_args), process, Path(file), ros_args)
+    ros_args = tuple(arguments[end + 1 :])
+    return OwnProcess(_with_clock(plan, ros_args), process, Path(file), ros_args)
 
 
 def _with_clock(plan: Plan, ros_args: Sequence[str]) -> Plan:
-    """Return the plan with the clock that ``-p use_sim_time:=…`` sets, if any does."""
+    """Return the plan with the clock that ``-p use_sim_time:=…`` sets, if present."""
     values = [
         value.lower()
         for flag, rule in pairwise(ros_args)
@@ -176,11 +187,11 @@ def _unfit(message: str, file: str) -> RejectedError:
 
 
 def wait_for_go(stop: Stop) -> bool:
-    """Wait before the first message until the launcher releases this process, if it holds it.
+    """Wait, if the launcher holds this process, until the launcher releases it.
 
-    Return False if the process is to end instead. Before the start, ``up`` checks whether an edge
-    is already published. Meanwhile its publishers join ROS, so that listeners know them when the
-    launcher releases them. A process that starts over is still held.
+    Return False if the process should end instead. Before the start, ``up`` checks whether an edge
+    is already published. Meanwhile its publishers join ROS, so that listeners have discovered them
+    when the launcher releases them. A process that starts again is still held.
     """
     if HOLD_FD not in os.environ:
         return not stop.requested
@@ -195,15 +206,20 @@ def wait_for_go(stop: Stop) -> bool:
     return not stop.requested
 
 
+def take_orders_fd() -> list[int]:
+    """Return the descriptor of the launcher's orders; empty without a launcher."""
+    return [int(os.environ.pop(ORDERS_FD))] if ORDERS_FD in os.environ else []
+
+
 def ready() -> None:
     """Tell systemd that this process is ready, as sd_notify(3) does.
 
-    Does nothing without systemd.
+    Without systemd, do nothing.
     """
     address = os.environ.get("NOTIFY_SOCKET", "")
     if address[:1] not in {"/", "@"}:
         return
-    name = f"\0{address[1:]}" if address[0] == "@" else address  # @: a name without a file
+    name = f"\0{address[1:]}" if address[0] == "@" else address  # @ marks an abstract socket
     with (
         contextlib.suppress(OSError),
         socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to_manager,

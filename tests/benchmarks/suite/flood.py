@@ -81,10 +81,10 @@ def _received() -> tuple[list[float], list[int]]:
 
     delays_ms: list[float] = []
     arrivals_ns: list[int] = []
-    with open_node("listener", "/bench") as own:
-        subscription, begun = TFSubscription(own, static=False), time.monotonic() + WARM_UP_S
+    with open_node("listener", "/bench") as node:
+        subscription, begun = TFSubscription(node, static=False), time.monotonic() + WARM_UP_S
         while time.monotonic() < begun + ROUND_S:
-            wait(own, [subscription], 0.2, Stop())
+            wait(node, [subscription], 0.2, Stop())
             for message in subscription.take():
                 # Some messages are sent again for a listener that joins.
                 if time.monotonic() < begun:

@@ -32,7 +32,7 @@ SECONDS, WARM_UP_S = 3.0, 1.0
 TIMEOUT_S = 20.0
 
 
-def own(workspace: Workspace, joints: int) -> list[str]:
+def planned_command(workspace: Workspace, joints: int) -> list[str]:
     """Write the plan of a robot with this many joints; return the command of ``joints``."""
     source = SourceLine("r", 1)
     edges = tuple(
@@ -181,7 +181,7 @@ def _rows(joints: int) -> dict[str, Row]:
 
 
 CONTENDERS: dict[Contender, Callable[[Workspace, int], list[str]]] = {
-    TFCOMPOSE_ON_ROS: own,
+    TFCOMPOSE_ON_ROS: planned_command,
     RCLPY: plain,
     STATE_PUBLISHER: state_publisher,
 }

@@ -20,7 +20,7 @@ HEAD = "tfcompose: 1\nrobot: r\nbase: base_link\n"
 CIRCLE = "optics: {scan: {horizontal: 360 deg, near: 0.05, far: 10}}"
 
 
-def found(text: str, code: str) -> list[Finding]:
+def findings_of(text: str, code: str) -> list[Finding]:
     done = compile_robot(HEAD + text, "r.yaml", library())
     assert not done.errors, done.errors
     return [finding for finding in done.findings if finding.code == code]
@@ -33,7 +33,7 @@ def scanner_at_a_wall(yaw_deg: float, scanner: str = CIRCLE) -> list[Finding]:
         " 4, 1]}}}\n"
     )
     turned = f"parent: base_link, xyz: [0, 0, 0.1], rpy: [0, 0, {yaw_deg} deg]"
-    return found(
+    return findings_of(
         f"{wall}sensors: {{lidar: {{preset: generic/lidar2d, {turned}, {scanner}}}}}\n", "TF642"
     )
 
@@ -59,16 +59,20 @@ def test_a_sector_ends_with_the_view_of_a_scanner_of_270_deg() -> None:
 )
 def test_a_sensor_is_inside_a_body_from_the_limit_on(height_cm: float, *, is_inside: bool) -> None:
     box = "links: {base_link: {visual: {box: [2, 2, 0.2]}}}\n"
-    at = f"parent: base_link, xyz: [0, 0, {height_cm} cm]"
+    mount = f"parent: base_link, xyz: [0, 0, {height_cm} cm]"
     image = "optics: {image: {horizontal: 60 deg, vertical: 40 deg}}"
     assert (
-        bool(found(f"{box}sensors: {{eye: {{preset: generic/camera, {at}, {image}}}}}\n", "TF640"))
+        bool(
+            findings_of(
+                f"{box}sensors: {{eye: {{preset: generic/camera, {mount}, {image}}}}}\n", "TF640"
+            )
+        )
         == is_inside
     )
 
 
 @pytest.mark.parametrize(("pitch_deg", "is_found"), [(60, True), (15, False), (-60, False)])
-def test_only_a_camera_whose_every_ray_meets_the_floor_near_by_sees_nothing_else(
+def test_a_camera_sees_only_floor_if_every_ray_meets_it_near_by(
     pitch_deg: float, *, is_found: bool
 ) -> None:
     wheels = "links: {base_link: {}, wheel: {visual: {sphere: {radius: 10 cm}}}}\n"
@@ -79,7 +83,7 @@ def test_only_a_camera_whose_every_ray_meets_the_floor_near_by_sees_nothing_else
     image = "optics: {image: {horizontal: 60 deg, vertical: 40 deg}}"
     assert (
         bool(
-            found(
+            findings_of(
                 f"{wheels}sensors: {{eye: {{preset: generic/camera, {pose}, {image}}}}}\n", "TF644"
             )
         )
@@ -88,7 +92,7 @@ def test_only_a_camera_whose_every_ray_meets_the_floor_near_by_sees_nothing_else
 
 
 @pytest.mark.parametrize(("height_cm", "is_found"), [(0, True), (2, True), (4, False)])
-def test_scanners_dazzle_each_other_where_one_plane_meets_the_others_window(
+def test_scanners_dazzle_each_other_if_a_plane_meets_the_others_window(
     height_cm: float, *, is_found: bool
 ) -> None:
     text = "frames: {base_link: {}}\nsensors:\n"
@@ -96,7 +100,7 @@ def test_scanners_dazzle_each_other_where_one_plane_meets_the_others_window(
         text += (
             f"  {name}: {{preset: generic/lidar2d, parent: base_link, xyz: {pose}, {CIRCLE}}}\n"
         )
-    assert bool(found(text, "TF645")) == is_found
+    assert bool(findings_of(text, "TF645")) == is_found
 
 
 def test_the_poses_of_fixed_frames_are_computed_once_a_robot(
@@ -114,7 +118,7 @@ def test_the_poses_of_fixed_frames_are_computed_once_a_robot(
         return _reach_frames(neighbours, poses)
 
     monkeypatch.setattr("tfcompose.compiler.rays.bodies._reach_frames", walked)
-    assert found(text, "TF645")
+    assert findings_of(text, "TF645")
     assert len(walks) == 2  # what is fixed, and what turns on it
 
 
@@ -123,12 +127,14 @@ def test_the_body_of_the_other_sensor_shields_nobody_from_it() -> None:
     text = "links: {base_link: {}}\nsensors:\n"
     for name, pose in (("one", "xyz: [0, 0, 1]"), ("other", "xyz: [2, 0, 1], look: backward")):
         text += f"  {name}: {{preset: realsense/d435, {facing.format(name)}, {pose}}}\n"
-    assert len(found(text, "TF645")) == 1
+    assert len(findings_of(text, "TF645")) == 1
     wall = "{parent: base_link, xyz: [1, 0, 1], visual: {box: [0.01, 1, 1]}}"
-    assert found(text.replace("base_link: {}", f"base_link: {{}}, wall: {wall}"), "TF645") == []
+    assert (
+        findings_of(text.replace("base_link: {}", f"base_link: {{}}, wall: {wall}"), "TF645") == []
+    )
 
 
-def test_a_zone_is_covered_by_the_sensors_that_are_named_and_by_all_of_a_kind() -> None:
+def test_named_sensors_or_all_of_a_kind_cover_a_zone() -> None:
     image = "optics: {image: {horizontal: 60 deg, vertical: 40 deg, far: 10}}"
     text = "frames: {base_link: {}}\nsensors:\n"
     for name, yaw in (("front", 0), ("back", 180)):
@@ -137,7 +143,9 @@ def test_a_zone_is_covered_by_the_sensors_that_are_named_and_by_all_of_a_kind() 
             f" {image}}}\n"
         )
     text += "coverage: {ahead: {frame: base_link, center: [3, 0, 0], box: [1, 1, 0.5], by: %s}}\n"
-    assert [len(found(text % by, "TF646")) for by in ("front", "camera", "back", "lidar")] == [
+    assert [
+        len(findings_of(text % by, "TF646")) for by in ("front", "camera", "back", "lidar")
+    ] == [
         0,
         0,
         1,

@@ -35,7 +35,9 @@ NOT_OF_A_LINE |= {"TF021", "TF022"}
 #: Of the folder of overlays: tests/cli/test_robot_overlays.py.
 NOT_OF_A_LINE |= {"TF023"}
 #: Of what is measured: tests/tools/prove.
-NOT_OF_A_LINE |= {"TF650", "TF651", "TF652"}
+NOT_OF_A_LINE |= {"TF650", "TF651", "TF652", "TF653", "TF654"}
+#: Of adjusted mounts: tests/tools/adjust.
+NOT_OF_A_LINE |= {f"TF{number}" for number in range(660, 668)}
 #: Of what is imported: tests/tools/importers/test_shell.py.
 NOT_OF_A_LINE |= {"TF020"}
 #: Codes of the running robot, of its plan and of its surroundings.
@@ -105,8 +107,8 @@ def test_each_code_that_a_robot_file_can_provoke_has_a_marked_line(code: str) ->
     marked = {
         code
         for spec in SPECS
-        for found in marks(spec.read_text("utf-8")).values()
-        for _, code in found
+        for line_marks in marks(spec.read_text("utf-8")).values()
+        for _, code in line_marks
     }
     assert code in marked
 
@@ -129,13 +131,13 @@ CONFLICTS = {
 @pytest.mark.parametrize(("code", "spec"), CONFLICTS.items())
 def test_a_conflict_shows_its_other_place_too(code: str, spec: str) -> None:
     of_code = [entry for entry in compiled(SPECS[0].parent / spec).findings if entry.code == code]
-    shown = [
+    with_note = [
         entry
         for entry in of_code
         if any(note.span and note.span != entry.span for note in entry.notes)
     ]
-    assert shown
-    alone = [entry for entry in of_code if entry not in shown]
+    assert with_note
+    alone = [entry for entry in of_code if entry not in with_note]
     assert all("self" in entry.message for entry in alone), "only a frame on itself has one place"
 
 
@@ -155,8 +157,8 @@ def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> Non
 
 def test_findings_come_in_the_order_of_the_file() -> None:
     findings = compiled(SPECS[0].parent / "everything.yaml").findings
-    at = [(entry.span.line, entry.span.column) for entry in findings if entry.span]
-    assert at == sorted(at)
+    positions = [(entry.span.line, entry.span.column) for entry in findings if entry.span]
+    assert positions == sorted(positions)
 
 
 @pytest.mark.parametrize(
@@ -172,13 +174,16 @@ def test_the_nearest_known_name_is_the_advice(spec: str, wrong: str, right: str)
     assert any(wrong in words(entry) and right in words_of(entry.help) for entry in findings)
 
 
-def test_the_advice_for_a_chain_of_joints_that_follow_each_other_moves_the_last_as_before() -> (
-    None
-):
+@pytest.mark.parametrize(
+    ("of_first", "of_second", "advice"), [(0, 0, "-0.9"), (0.25, 0, "-0.9"), (0.25, 0.1, "-1.1")]
+)
+def test_the_advice_for_chained_joints_keeps_the_motion_of_the_last(
+    of_first: float, of_second: float, advice: str
+) -> None:
     joint = "{{type: continuous, parent: base_link, child: {}{}}}"
     joints = {
-        "a": "",
-        "b": ", mimic: {joint: a, multiplier: 2, offset: 0.5}",
+        "a": f", offset: {of_first}",
+        "b": f", offset: {of_second}, mimic: {{joint: a, multiplier: 2, offset: 0.5}}",
         "c": ", mimic: {joint: b, multiplier: -2, offset: 0.1}",
     }
     lines = [f"  {name}: {joint.format(name, more)}" for name, more in joints.items()]
@@ -186,7 +191,7 @@ def test_the_advice_for_a_chain_of_joints_that_follow_each_other_moves_the_last_
     text = f"tfcompose: 1\nrobot: r\n{links}" + "\n".join(lines)
     findings = compile_robot(text, "r.yaml", library()).findings
     (chain,) = [entry for entry in findings if entry.code == "TF708"]
-    assert "{joint: a, multiplier: -4, offset: -0.9}" in chain.help
+    assert f"{{joint: a, multiplier: -4, offset: {advice}}}" in chain.help
 
 
 def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on() -> None:

@@ -50,11 +50,11 @@ def test_what_leaves_nothing_to_build_always_counts(text: str, code: str) -> Non
         f"tfcompose: 1\nrobot: r\nrules: {{{code}: off}}\n{text}  # tfcompose: allow {code}"
         " because I say so\n"
     )
-    found = {
+    severities = {
         finding.code: finding.severity
         for finding in compile_robot(text, "r.yaml", PRESETS).findings
     }
-    assert (found[code], found["TF017"]) == ("error", "error")
+    assert (severities[code], severities["TF017"]) == ("error", "error")
 
 
 @pytest.mark.parametrize(

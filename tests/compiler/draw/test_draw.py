@@ -73,7 +73,8 @@ def tree(seed: int, frames: int, *, poses: bool = False, odd: bool = False) -> G
         tuple(names),
         tuple(arrows),
         tuple(
-            Group(f"sensor{index} · vendor/model", tuple(own)) for index, own in members.items()
+            Group(f"sensor{index} · vendor/model", tuple(frames_of_group))
+            for index, frames_of_group in members.items()
         ),
         tuple(owners),
     )
@@ -143,7 +144,7 @@ def nothing_overlaps(drawing: Drawing, frames: int) -> None:
     for some in (texts, boxes):
         some.sort()
         for index, picture in enumerate(some):
-            assert not any(overlaps(picture, other) for other in some[index + 1 :])
+            assert not any(overlaps(picture, second) for second in some[index + 1 :])
     for left, top, right, bottom in (*texts, *boxes):
         assert left > 0
         assert top > 0
@@ -331,7 +332,7 @@ def test_odd_names_are_well_formed_and_escaped_in_every_format() -> None:
     graph = tree(3, 20, odd=True)
     drawing = draw(graph)
     root = parsed(drawing)
-    shown = [text.text for text in root.iter(f"{SVG}text") if text.get("class") == "name"]
+    names = [text.text for text in root.iter(f"{SVG}text") if text.get("class") == "name"]
     assert {
         "a<b>&\"c'",
         "back\\slash\\",
@@ -339,7 +340,7 @@ def test_odd_names_are_well_formed_and_escaped_in_every_format() -> None:
         "bell\\x07",
         "\\u202eturned",
         "底盤",
-    } <= set(shown)
+    } <= set(names)
     read = read_dot(graph)
     assert len(read.get_edges()) == len(graph.arrows)
     assert opened(drawing).size == pytest.approx((2 * drawing.width, 2 * drawing.height), abs=2)

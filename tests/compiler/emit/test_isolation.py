@@ -72,7 +72,9 @@ def test_topics_move_below_the_namespace_for_every_process_that_is_started() -> 
     assert plan.base == "base_link"
     argv = plan.process("ekf").argv
     assert [
-        argv[at + 1] for at, word in enumerate(argv) if word == "-r" and ":=" in argv[at + 1]
+        argv[index + 1]
+        for index, word in enumerate(argv)
+        if word == "-r" and ":=" in argv[index + 1]
     ] == [
         "__node:=ekf",
         "__ns:=/robot1",

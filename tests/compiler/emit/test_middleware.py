@@ -37,7 +37,7 @@ def built(ros: str, more: str = "", guard: str = "watch", host: str = "brain") -
     return read_plan(files["plan.json"], "plan.json")
 
 
-def test_on_zenoh_one_router_is_a_process_and_everything_that_is_started_waits_for_it() -> None:
+def test_on_zenoh_one_router_is_a_process_and_every_process_waits_for_it() -> None:
     plan = built("rmw: zenoh, discovery: localhost")
     router = plan.process(ROUTER)
     assert (router.kind, router.argv, router.host) == ("run", (ROUTER_PROGRAM,), "brain")

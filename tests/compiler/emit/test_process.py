@@ -135,7 +135,7 @@ SECTIONS = """
 """
 
 
-def test_a_path_that_the_launcher_fills_in_counts_before_every_section_of_its_node(
+def test_a_path_from_the_launcher_precedes_every_section_of_its_node(
     tmp_path: Path,
 ) -> None:
     """The command line counts for /**, which a pattern that comes later is laid over."""
@@ -380,7 +380,7 @@ def built_at(
     return files["plan.json"], read_plan(files["plan.json"], "plan.json").process("a")
 
 
-def test_a_file_is_named_from_the_plans_folder_and_found_from_wherever_the_plan_is_started(
+def test_a_file_path_is_relative_to_the_plan_and_found_from_any_folder(
     tmp_path: Path,
 ) -> None:
     built = built_at(tmp_path, "build/r")
@@ -439,9 +439,9 @@ def test_a_file_that_is_missing_or_of_no_known_format_is_a_finding(
 ) -> None:
     text = FILES.replace("${build_dir}/x", "${params_file}")
     assert old in text
-    found = built_at(tmp_path, "build/r", text.replace(old, new))
-    assert isinstance(found, list)
-    assert code in [finding.code for finding in found]
+    result = built_at(tmp_path, "build/r", text.replace(old, new))
+    assert isinstance(result, list)
+    assert code in [finding.code for finding in result]
 
 
 def test_a_node_that_is_listed_alone_does_not_rename_the_others() -> None:
@@ -472,7 +472,7 @@ ROS2 = {
 
 
 @pytest.mark.parametrize("words", ROS2)
-def test_a_ros2_command_is_started_as_the_package_or_launch_file_that_it_is(words: str) -> None:
+def test_a_ros2_command_starts_as_its_package_or_launch_file(words: str) -> None:
     more = "params: {rate: 5}" if "executable" in ROS2[words] else "log_level: debug"
     assert process_of(f"{words}, {more}") == process_of(f"{ROS2[words]}, {more}")
 
@@ -623,7 +623,7 @@ def test_a_plan_whose_component_nobody_can_load_is_refused(old: str, new: str, w
     assert word in error.value.findings[0].message
 
 
-def test_a_sensors_driver_may_be_a_component_with_the_parameters_of_its_preset() -> None:
+def test_a_sensor_driver_may_be_a_component_with_its_presets_parameters() -> None:
     head = with_box().replace("map: {}", "base: {}").replace("processes:", "sensors:")
     driver = (
         "component: 'realsense2_camera/realsense2_camera::RealSenseNodeFactory', container: box,"

@@ -44,14 +44,14 @@ def compiled(more: str = "") -> Compiled:
 
 
 def built(more: str = "") -> tuple[dict[str, Any], dict[str, str]]:
-    found = compiled(more)
-    assert not found.findings, found.findings
-    assert found.robot
-    files = {file.path: file.text for file in emit(found.robot)}
+    compilation = compiled(more)
+    assert not compilation.findings, compilation.findings
+    assert compilation.robot
+    files = {file.path: file.text for file in emit(compilation.robot)}
     return json.loads(files["plan.json"]), files
 
 
-def test_the_stock_publisher_owns_what_is_ours_below_base_and_static_the_rest() -> None:
+def test_the_stock_publisher_owns_edges_below_base_and_static_the_rest() -> None:
     plan, _ = built()
     owners = {(edge["parent"], edge["child"]): edge["owner"] for edge in plan["edges"]}
     assert owners == {
@@ -70,7 +70,7 @@ def test_the_stock_publisher_owns_what_is_ours_below_base_and_static_the_rest() 
     assert {edge["node"] for edge in plan["edges"] if edge["owner"] == "joints"} == {
         "/rover/robot_state_publisher"
     }
-    remaps = {words[at + 1] for at, word in enumerate(words) if word == "-r"}
+    remaps = {words[index + 1] for index, word in enumerate(words) if word == "-r"}
     assert {"robot_description:=~/robot_description", "/tf:=/rover/tf", "__ns:=/rover"} <= remaps
     assert not any("<robot" in word for word in words)
     assert joints["env"] == {"A": "b"}
@@ -90,18 +90,20 @@ def test_its_parameters_hold_robot_urdf_word_for_word_and_the_prefix() -> None:
     assert "frame_prefix" not in built()[1]["params/joints.yaml"]
 
 
-def test_its_frequency_is_a_double_as_it_declares_it_also_where_the_file_has_an_integer() -> None:
+def test_its_frequency_is_a_double_even_if_the_file_has_an_integer() -> None:
     text = (
         "tfcompose: 1\nrobot: r\nros: {state_publisher: stock}\nlinks: {base_link: {}, a: {parent:"
         " base_link}}\n"
     )
-    found = compile_robot(
+    compilation = compile_robot(
         f"{text}processes: {{joints: {{params: {{publish_frequency: 50}}}}}}\n",
         "r.yaml",
         library(),
     )
-    assert found.robot
-    (params,) = (file.text for file in emit(found.robot) if file.path == "params/joints.yaml")
+    assert compilation.robot
+    (params,) = (
+        file.text for file in emit(compilation.robot) if file.path == "params/joints.yaml"
+    )
     assert (
         type(
             yaml.safe_load(params)["/robot_state_publisher"]["ros__parameters"][
@@ -112,7 +114,7 @@ def test_its_frequency_is_a_double_as_it_declares_it_also_where_the_file_has_an_
     )
 
 
-def test_robot_urdf_is_one_tree_whose_root_has_no_inertia_and_foreign_edges_float() -> None:
+def test_robot_urdf_is_one_tree_with_a_massless_root_and_floating_edges() -> None:
     _, files = built()
     stock, full = (
         ET.fromstring(files[name])  # noqa: S314 (ours)
@@ -140,9 +142,11 @@ def test_static_sends_the_description_even_where_it_has_no_edge() -> None:
         "tfcompose: 1\nrobot: r\nros: {state_publisher: stock}\nlinks: {base_link: {}, a: {parent:"
         " base_link}}\n"
     )
-    found = compile_robot(text, "r.yaml", library())
-    assert found.robot
-    plan = json.loads(next(file.text for file in emit(found.robot) if file.path == "plan.json"))
+    compilation = compile_robot(text, "r.yaml", library())
+    assert compilation.robot
+    plan = json.loads(
+        next(file.text for file in emit(compilation.robot) if file.path == "plan.json")
+    )
     kinds = {process["name"]: process["kind"] for process in plan["processes"]}
     assert kinds == {"static": "static", "joints": "run", "guard": "guard"}
 
@@ -172,10 +176,10 @@ ARM = (
 
 def test_only_a_part_that_is_a_robot_has_a_stock_publisher_of_its_own() -> None:
     texts = {"r.yaml": ONE, "arm.yaml": ARM}
-    found = compile_robot(FLEET, "fleet.yaml", library(), read=texts.__getitem__)
-    assert not found.errors, found.errors
-    assert found.robot
-    files = {file.path: file.text for file in emit(found.robot)}
+    compilation = compile_robot(FLEET, "fleet.yaml", library(), read=texts.__getitem__)
+    assert not compilation.errors, compilation.errors
+    assert compilation.robot
+    files = {file.path: file.text for file in emit(compilation.robot)}
     plan = json.loads(files["plan.json"])
     owners = {edge["child"]: edge["owner"] for edge in plan["edges"]}
     assert (owners["r1/mast"], owners["r1/dock"], owners["r1/lens"]) == (

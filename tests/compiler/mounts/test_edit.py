@@ -69,13 +69,13 @@ def kept_elsewhere(text: str, overlay_over: str, child: str, pose: Pose) -> Else
     """Return why the pose is not edited; an overlay gives it."""
     done = compiled(text, overlay_over)
     assert done.robot
-    found = change_of(done.robot, done.sources[0], {"r.yaml": text}, child, pose)
-    assert isinstance(found, Elsewhere)
-    overlay = found.overlay(overlay_over, "o.yaml")
+    change = change_of(done.robot, done.sources[0], {"r.yaml": text}, child, pose)
+    assert isinstance(change, Elsewhere)
+    overlay = change.overlay(overlay_over, "o.yaml")
     off = offset_of(pose, pose_in(robot_of(text, overlay), child))
     assert off.xyz_m < 1e-6, overlay
     assert off.rot_rad < 1e-6, overlay
-    return found
+    return change
 
 
 def changed_lines(old: str, new: str) -> list[str]:
@@ -249,11 +249,11 @@ def test_the_pose_that_a_mount_has_needs_no_edit(case: tuple[str, str]) -> None:
 
 @given(robots(), poses)
 @settings(max_examples=25, deadline=None)
-def test_moving_there_and_back_is_the_pose_it_was(case: tuple[str, str], there: Pose) -> None:
+def test_moving_there_and_back_is_the_pose_it_was(case: tuple[str, str], pose_there: Pose) -> None:
     text, child = case
     robot = robot_of(text)
     child = child_of(robot, child)
-    moved(moved(text, child, there), child, pose_in(robot, child))
+    moved(moved(text, child, pose_there), child, pose_in(robot, child))
 
 
 BASE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
@@ -339,6 +339,15 @@ def test_both_that_are_missing_are_one_edit() -> None:
     assert changed_lines(text, new) == ["    xyz: [0.1, 0.2, 0]", "    rpy: [0, 10 deg, 0]"]
 
 
+def test_a_joint_keeps_the_offset_of_its_zero() -> None:
+    text = f"{BASE}frames: {{tool: {{}}}}\njoints:\n  turn:\n    type: continuous\n"
+    text += "    parent: base_link\n    child: tool\n    axis: [0, 0, 1]\n    offset: 10 deg\n"
+    text += "    rpy: [90 deg, 0, 0]\n"
+    mount = Pose((0, 0, 0), quat_from_rpy(math.radians(80), 0, 0))
+    new = moved(text, "tool", mount @ Pose(quat_xyzw=quat_from_rpy(0, 0, math.radians(10))))
+    assert changed_lines(text, new) == ["    rpy: [80 deg, 0, 0]"]
+
+
 def test_a_profile_is_edited_where_it_stands() -> None:
     text = f"{BASE}frames:\n  tool: {{parent: base_link, xyz: [0, 0, 1]}}\n"
     text += "profiles:\n  tall:\n    frames: {tool: {xyz: [0, 0, 2]}}\n"
@@ -381,10 +390,10 @@ def test_what_is_not_the_mounts_own_is_offered_in_an_overlay(name: str, overlay:
         if child in robot_of(BASE + text).frames
         else robot_of(BASE + text).sensors[0].frames[0]
     )
-    found = kept_elsewhere(
+    change = kept_elsewhere(
         BASE + text, overlay, child, Pose((0.1, 0.2, 0.3), quat_from_rpy(0.1, 0.2, 0.3))
     )
-    assert reason in found.reason
+    assert reason in change.reason
 
 
 def test_an_entry_that_another_one_shares_gets_no_new_key() -> None:
@@ -398,15 +407,15 @@ def test_an_entry_that_another_one_shares_gets_no_new_key() -> None:
 def test_what_a_profile_shares_is_not_edited(
     values: tuple[str, str], profiles: tuple[str, ...]
 ) -> None:
-    own, other = values
-    text = f"{BASE}frames:\n  tool: {{parent: base_link, xyz: {own}}}\n"
-    text += f"profiles:\n  tall:\n    frames: {{tool: {{xyz: {other}}}}}\n"
+    base_xyz, profile_xyz = values
+    text = f"{BASE}frames:\n  tool: {{parent: base_link, xyz: {base_xyz}}}\n"
+    text += f"profiles:\n  tall:\n    frames: {{tool: {{xyz: {profile_xyz}}}}}\n"
     done = compiled(text, profiles=profiles)
     assert done.robot
-    found = change_of(done.robot, done.sources[0], {"r.yaml": text}, "tool", Pose((0, 0, 2)))
-    assert isinstance(found, Elsewhere)
-    assert "profiles.tall.frames.tool" in found.reason
-    assert pose_in(robot_of(text, found.overlay("", "o.yaml"), profiles), "tool") == Pose(
+    change = change_of(done.robot, done.sources[0], {"r.yaml": text}, "tool", Pose((0, 0, 2)))
+    assert isinstance(change, Elsewhere)
+    assert "profiles.tall.frames.tool" in change.reason
+    assert pose_in(robot_of(text, change.overlay("", "o.yaml"), profiles), "tool") == Pose(
         (0, 0, 2)
     )
 
@@ -449,21 +458,21 @@ def test_every_mount_of_the_gallery_moves_or_says_why_not(file: Path) -> None:
             ),
         )
         try:
-            found = change_of(
+            change = change_of(
                 done.robot, done.sources[0], {f"robots/{file.name}": text}, edge.child, pose
             )
         except ImmovableError:
             continue
-        if isinstance(found, Elsewhere):
-            if not found.entry:
+        if isinstance(change, Elsewhere):
+            if not change.entry:
                 continue
-            overlay = found.overlay("", "o.yaml")
+            overlay = change.overlay("", "o.yaml")
             after = compiled(text, overlay, file=f"robots/{file.name}")
         else:
-            new = apply_edits(text, found.edits)
+            new = apply_edits(text, change.edits)
             assert new is not None
             after = compiled(new, file=f"robots/{file.name}")
         assert after.robot
         off = offset_of(pose, pose_in(after.robot, edge.child))
-        assert off.xyz_m < 1e-6, (edge.name, found)
-        assert off.rot_rad < 1e-6, (edge.name, found)
+        assert off.xyz_m < 1e-6, (edge.name, change)
+        assert off.rot_rad < 1e-6, (edge.name, change)

@@ -49,14 +49,14 @@ def variants(name: str) -> Iterator[dict[str, list[tuple[str, PresetFrame]]]]:
     }
     for chosen in product(*choices.values()):
         preset = KNOWN.get(name, dict(zip(choices, chosen, strict=True)))
-        found = {}
+        frames_by_name = {}
         for pattern, frame in preset.frames.items():
             parents = [frame.parent, *([frame.by_driver.parent] if frame.by_driver else [])]
             named = fill_name(pattern, "{name}", preset.words)
-            found[named] = [
+            frames_by_name[named] = [
                 (fill_name(parent, "{name}", preset.words), frame) for parent in parents
             ]
-        yield found
+        yield frames_by_name
 
 
 def is_there(frame: PresetFrame, fact: dict[str, Any], name: str, *, optical: bool) -> bool:
@@ -82,13 +82,13 @@ def is_there(frame: PresetFrame, fact: dict[str, Any], name: str, *, optical: bo
 )
 def test_a_frame_is_where_the_package_of_its_vendor_has_it(preset: str, name: str) -> None:
     fact = FACTS[preset][name]
-    found = [frame for frames in variants(preset) for frame in frames.get(name, [])]
-    assert found, f"no {name}"
-    hung = [frame for parent, frame in found if parent == fact["parent"]]
+    placements = [frame for frames in variants(preset) for frame in frames.get(name, [])]
+    assert placements, f"no {name}"
+    hung = [frame for parent, frame in placements if parent == fact["parent"]]
     if (preset, name) in DRIVER_S_WAY:
         assert not hung
         return
     optical = (preset, name) in OPTICAL_HERE
     assert any(is_there(frame, fact, name, optical=optical) for frame in hung), [
-        (parent, frame.xyz) for parent, frame in found
+        (parent, frame.xyz) for parent, frame in placements
     ]

@@ -38,11 +38,11 @@ BY_DEFAULT = {
 
 
 def optics(preset: str, **options: str) -> dict[str, Optics]:
-    known = KNOWN.get(preset).options
-    every = {key: list(fact.values) for key, fact in known.items() if fact.type == "set"}
+    facts = KNOWN.get(preset).options
+    every = {key: list(fact.values) for key, fact in facts.items() if fact.type == "set"}
     chosen = {
         **every,
-        **{key: True for key, fact in known.items() if fact.type == "bool"},
+        **{key: True for key, fact in facts.items() if fact.type == "bool"},
         **options,
     }
     if preset == "realsense/t265":
@@ -66,8 +66,12 @@ def degrees(sector: tuple[float, float] | None) -> Any:
 def assert_says(stream: Optics, preset: str, fact: dict[str, Any]) -> None:
     """Assert that every figure of the facts is that of the stream."""
 
-    def expect(key: str, found: Any, value: Any) -> None:
-        assert found is None if (preset, key) in LEFT_OUT else found == value, (key, found, value)
+    def expect(key: str, actual: Any, value: Any) -> None:
+        assert actual is None if (preset, key) in LEFT_OUT else actual == value, (
+            key,
+            actual,
+            value,
+        )
 
     for key, word in (("horizontal", "hfov_deg"), ("vertical", "vfov_deg")):
         if word in fact:
@@ -117,14 +121,14 @@ def of_mode(fact: dict[str, Any], mode: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("preset", FACTS)
 def test_a_stream_sees_what_its_maker_says(preset: str) -> None:
-    found = optics(preset)
+    streams = optics(preset)
     for stream, fact in FACTS[preset].items():
         modes = FACTS[preset].get("left", fact).get("modes", {})
         default = BY_DEFAULT.get(preset, "HD1200")
         if preset.startswith("zed/") and default in modes and "hfov_deg" in fact:
-            assert_says(found[stream], preset, of_mode(fact, modes[default]))
+            assert_says(streams[stream], preset, of_mode(fact, modes[default]))
         else:
-            assert_says(found[stream], preset, fact)
+            assert_says(streams[stream], preset, fact)
 
 
 OPTION = {"zed": "resolution", "microsoft": "depth_mode", "orbbec": "depth_mode"}
@@ -143,8 +147,8 @@ def test_an_option_chooses_what_a_stream_sees(preset: str, stream: str) -> None:
     fact = FACTS[preset][stream]
     for mode, figures in fact["modes"].items():
         if mode != "passive_ir":
-            found = optics(preset, **{OPTION[preset.partition("/")[0]]: mode})[stream]
-            assert_says(found, f"{preset} {mode}", of_mode(fact, figures))
+            optics_of_stream = optics(preset, **{OPTION[preset.partition("/")[0]]: mode})[stream]
+            assert_says(optics_of_stream, f"{preset} {mode}", of_mode(fact, figures))
 
 
 def test_an_image_of_4_to_3_is_a_crop_and_narrower() -> None:

@@ -95,12 +95,12 @@ def test_its_optical_frames_have_z_forward_x_right_and_y_down(name: str) -> None
             if not is_optical(edge.child) or is_optical(edge.parent):
                 continue
             assert angle_between(edge.pose.quat_xyzw, OPTICAL_XYZW) < 1e-9
-            for axis, wanted in (
+            for axis, expected in (
                 ((0, 0, 1), (1, 0, 0)),
                 ((1, 0, 0), (0, -1, 0)),
                 ((0, 1, 0), (0, 0, -1)),
             ):
-                assert math.dist(rotate(edge.pose.quat_xyzw, axis), wanted) < 1e-9, edge.name
+                assert math.dist(rotate(edge.pose.quat_xyzw, axis), expected) < 1e-9, edge.name
         cameras = {"camera", "stereo", "rgbd"}
         if KNOWN.get(name).kind in cameras and name != "microsoft/azure-kinect":
             assert any(map(is_optical, robot.frames))
@@ -110,12 +110,12 @@ def test_the_optical_frames_of_a_t265_have_x_right_y_up_and_z_backward() -> None
     for _tf, _options, robot in robots("realsense/t265"):
         for edge in robot.edges:
             if is_optical(edge.child):
-                for axis, wanted in (
+                for axis, expected in (
                     ((1, 0, 0), (0, -1, 0)),
                     ((0, 1, 0), (0, 0, 1)),
                     ((0, 0, 1), (-1, 0, 0)),
                 ):
-                    assert math.dist(rotate(edge.pose.quat_xyzw, axis), wanted) < 1e-9
+                    assert math.dist(rotate(edge.pose.quat_xyzw, axis), expected) < 1e-9
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -113,7 +113,7 @@ def test_without_a_switch_tfcompose_cannot_publish_what_the_driver_does(name: st
 
 
 @pytest.mark.parametrize("name", WITH_CLAIMS)
-def test_what_a_driver_claims_outside_its_sensor_is_switched_off_unless_it_owns_it(
+def test_claims_outside_the_sensor_are_switched_off_unless_owned(
     name: str,
 ) -> None:
     driver = KNOWN.get(name).driver
@@ -192,7 +192,7 @@ def test_two_of_one_kind_share_no_frame_no_node_and_no_serial_number() -> None:
     }
 
 
-def test_with_infra1_only_the_driver_hangs_the_optical_frame_on_aligned_depth() -> None:
+def test_only_with_infra1_the_optical_frame_hangs_on_aligned_depth() -> None:
     options = {"streams": ["depth", "color", "infra1"]}
     by_driver, ours = (
         robot_of("realsense/d455", options=options, tf=tf) for tf in ("driver", "tfcompose")
@@ -220,7 +220,7 @@ def test_a_zed_sends_its_lenses_on_tf_by_version_and_intra_process_option() -> N
     assert edge_of(placed, "s_camera_link").pose.xyz == pytest.approx((1.01, -0.06, -0.015))
 
 
-def test_the_l515_has_its_imu_on_colour_by_its_description_and_on_the_link_by_its_driver() -> None:
+def test_the_l515_imu_hangs_on_colour_by_urdf_and_on_the_link_by_driver() -> None:
     ours, by_driver = (
         robot_of("realsense/l515", options={"imu": True}, tf=tf) for tf in ("tfcompose", "driver")
     )
@@ -257,8 +257,8 @@ def test_a_driver_that_does_nothing_until_it_is_active_is_made_active() -> None:
         ("realsense/d435", {}, None),
     ):
         assert driver_of(robot_of(preset, options=options)).ros_nodes[0].lifecycle == state
-    own = {"run": {"package": "mine", "executable": "lidar"}}
-    assert driver_of(robot_of("ouster/os1", driver=own)).ros_nodes[0].lifecycle is None
+    driver = {"run": {"package": "mine", "executable": "lidar"}}
+    assert driver_of(robot_of("ouster/os1", driver=driver)).ros_nodes[0].lifecycle is None
 
 
 def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:
@@ -272,7 +272,7 @@ def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:
     ]
 
 
-def test_what_nobody_knows_is_requested_with_the_yaml_to_write_and_is_never_a_zero() -> None:
+def test_an_unknown_value_is_requested_with_its_yaml_and_is_never_zero() -> None:
     findings = compiled("realsense/d457", tf="tfcompose").findings
     yaml_to_write = (
         "sensors: {s: {frames: {s_color_frame: {xyz: [x, y, z], rpy: [roll, pitch, yaw]}}}}"
@@ -299,7 +299,7 @@ def test_every_preset_has_no_findings_with_its_default_options(name: str) -> Non
     assert findings == ()
 
 
-def test_where_only_the_driver_knows_a_frame_is_its_edge_is_declared_without_a_pose() -> None:
+def test_an_edge_that_only_the_driver_knows_is_declared_without_a_pose() -> None:
     on_it = 'frames: {"on_color": {"parent": "s_color_frame", "xyz": [0, 0, 1]}}\n'
     robot = robot_of("realsense/d457", on_it, options={"streams": ["depth", "color"]})
     edges = {edge.child: (edge.owner, edge.pose_known) for edge in robot.edges}
@@ -337,8 +337,8 @@ def test_what_needs_an_unknown_pose_is_refused_and_says_what_would_give_it(
     capsys.readouterr()
     assert main(["tree", str(file), "--format", "json"]) == 0
     (tree,) = json.loads(capsys.readouterr().out)["trees"]
-    shown = {edge["child"]: edge["xyz"] for edge in tree["edges"]}
-    assert (shown["s_color_frame"], shown["s_depth_frame"]) == (None, [0.0, 0.0, 0.0])
+    positions = {edge["child"]: edge["xyz"] for edge in tree["edges"]}
+    assert (positions["s_color_frame"], positions["s_depth_frame"]) == (None, [0.0, 0.0, 0.0])
 
 
 def test_an_unknown_frame_stays_out_of_what_a_stock_publisher_takes_over() -> None:
@@ -408,7 +408,7 @@ def test_a_folder_next_to_the_robot_adds_presets(tmp_path: Path) -> None:
     assert compiled("me/mist", top, file).findings[0].help == "did you mean me/mast?"
 
 
-def test_a_preset_that_stands_before_a_built_in_one_is_reported_and_may_change_it(
+def test_a_preset_that_shadows_a_built_in_is_reported_and_may_change_it(
     tmp_path: Path,
 ) -> None:
     text = (

@@ -91,13 +91,13 @@ def test_a_ray_ends_where_trimesh_says(
     where, index, _ = mesh.ray.intersects_location(np.zeros((len(into), 3)), np.asarray(into))
     expected = np.full(len(into), np.inf)
     np.minimum.at(expected, index, np.linalg.norm(where, axis=1))
-    found = np.array([ray.distance for ray in view.rays])
-    both = np.isfinite(expected) & np.isfinite(found)
+    distances = np.array([ray.distance for ray in view.rays])
+    both = np.isfinite(expected) & np.isfinite(distances)
     grazing = np.isfinite(expected) != np.isfinite(
-        found
+        distances
     )  # the mesh is a polyhedron inside the round shape
     assert grazing.sum() <= 2
-    steep = np.abs(found[both] - expected[both]) > 5e-3
+    steep = np.abs(distances[both] - expected[both]) > 5e-3
     assert steep.sum() <= 2
 
 
@@ -163,24 +163,24 @@ def view(text: str) -> View:
 
 
 def test_a_wall_over_the_left_half_blocks_half_the_image() -> None:
-    found = view(
+    result = view(
         "links: {base_link: {}, wall: {parent: base_link, xyz: [2, 5, 0], visual: {box: [0.1, 10,"
         " 20]}}}\nsensors: {c: {preset: generic/camera, parent: base_link, optics: {image:"
         " {horizontal: 80 deg, vertical: 60 deg}}}}\n"
     )
-    assert found.blocked == pytest.approx(0.5)
-    assert found.blocking == ("wall",)
-    assert min(ray.distance for ray in found.rays) == pytest.approx(1.95, rel=0.01)
+    assert result.blocked == pytest.approx(0.5)
+    assert result.blocking == ("wall",)
+    assert min(ray.distance for ray in result.rays) == pytest.approx(1.95, rel=0.01)
 
 
 def test_a_pole_blocks_the_sector_that_it_fills() -> None:
-    found = view(
+    result = view(
         "links: {base_link: {}, pole: {parent: base_link, xyz: [1, 0, 0], visual: {cylinder:"
         " {radius: 0.5, length: 1}}}}\nsensors: {s: {preset: generic/lidar2d, parent: base_link,"
         " optics: {scan: {horizontal: 360 deg}}}}\n"
     )
-    assert sum(ray.link == "pole" for ray in found.rays) == 60  # twice the arc sine of a half
-    assert len(found.rays) == 360
+    assert sum(ray.link == "pole" for ray in result.rays) == 60  # twice the arc sine of a half
+    assert len(result.rays) == 360
 
 
 def test_what_is_beyond_the_range_blocks_nothing() -> None:
@@ -223,9 +223,9 @@ def test_a_mesh_is_hit_where_the_same_primitive_is(tmp_path: Path) -> None:
     assert cast("s", SCAN, (), [PosedShape("b", shape, turned[1])]).inside["b"] == pytest.approx(
         0.5, abs=0.01
     )
-    for ray, other in zip(by_mesh.rays, by_shape.rays, strict=True):
-        if math.isfinite(ray.distance) and math.isfinite(other.distance):
-            assert ray.distance == pytest.approx(other.distance, abs=0.02)
+    for ray, twin in zip(by_mesh.rays, by_shape.rays, strict=True):
+        if math.isfinite(ray.distance) and math.isfinite(twin.distance):
+            assert ray.distance == pytest.approx(twin.distance, abs=0.02)
 
 
 @pytest.mark.filterwarnings(
@@ -238,8 +238,8 @@ def test_a_collada_file_is_in_its_own_unit_here_and_in_the_view(tmp_path: Path) 
         text.replace("<asset>", '<asset><unit name="centimeter" meter="0.01"/>'), "utf-8"
     )
     shape = Shape("mesh", (10.0, 10.0, 10.0), Pose(), mesh=Asset("box.dae", path=str(file)))
-    found = cast("s", SCAN, ((1.0, 0.0, 0.0),), [PosedShape("b", shape, Pose((1.0, 0.0, 0.0)))])
-    assert found.rays[0].distance == pytest.approx(0.9)
+    result = cast("s", SCAN, ((1.0, 0.0, 0.0),), [PosedShape("b", shape, Pose((1.0, 0.0, 0.0)))])
+    assert result.rays[0].distance == pytest.approx(0.9)
     assert mesh_of(shape).extents == pytest.approx([0.2, 0.2, 0.2])
 
 
@@ -247,8 +247,8 @@ def test_a_mesh_that_cannot_be_read_blocks_nothing_and_is_named(tmp_path: Path) 
     shape = Shape(
         "mesh", (1.0, 1.0, 1.0), Pose(), mesh=Asset("none.stl", path=str(tmp_path / "none.stl"))
     )
-    found = cast("s", SCAN, directions(SCAN), [PosedShape("b", shape, Pose((1.0, 0, 0)))])
-    assert (found.blocked, found.left_out) == (0, ("b",))
+    result = cast("s", SCAN, directions(SCAN), [PosedShape("b", shape, Pose((1.0, 0, 0)))])
+    assert (result.blocked, result.left_out) == (0, ("b",))
 
 
 KINDS = [
@@ -275,7 +275,7 @@ KINDS = [
 
 
 @pytest.mark.parametrize("optics", KINDS, ids=lambda ray: ray.stream)
-def test_every_ray_is_a_unit_vector_in_the_field_of_view_and_its_opposite_is_not(
+def test_every_ray_is_a_unit_vector_in_view_and_its_opposite_is_not(
     optics: Optics,
 ) -> None:
     into = directions(optics)
@@ -287,7 +287,7 @@ def test_every_ray_is_a_unit_vector_in_the_field_of_view_and_its_opposite_is_not
         assert full_circle or not contains(optics, (-x, -y, -z))
 
 
-def test_a_camera_views_along_z_with_x_right_and_y_down_and_the_others_along_x() -> None:
+def test_a_camera_views_along_z_and_other_sensors_along_x() -> None:
     middle = np.mean(directions(CAMERA), axis=0)
     assert middle == pytest.approx([0, 0, middle[2]], abs=1e-9)
     assert middle[2] > 0.8

@@ -54,12 +54,12 @@ def test_the_schema_is_the_official_one_of_2_1_0() -> None:
 
 @pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_it_is_valid_and_says_what_was_found(spec: Path) -> None:
-    found = findings(spec)
-    run = source_text(found)
+    expected = findings(spec)
+    run = source_text(expected)
     driver = run["tool"]["driver"]
     assert driver["name"] == "tfcompose"
-    assert len(run["results"]) == len(found)
-    for result, finding in zip(run["results"], found, strict=True):
+    assert len(run["results"]) == len(expected)
+    for result, finding in zip(run["results"], expected, strict=True):
         assert result["level"] == finding.severity
         assert driver["rules"][result["ruleIndex"]]["id"] == result["ruleId"] == finding.code
         assert result["message"]["text"].startswith(finding.message)
@@ -81,9 +81,9 @@ def test_it_is_valid_and_says_what_was_found(spec: Path) -> None:
 
 
 def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> None:
-    found = [finding for spec in SPECS for finding in findings(spec)]
-    rules = source_text(found)["tool"]["driver"]["rules"]
-    assert [rule["id"] for rule in rules] == sorted({finding.code for finding in found})
+    expected = [finding for spec in SPECS for finding in findings(spec)]
+    rules = source_text(expected)["tool"]["driver"]["rules"]
+    assert [rule["id"] for rule in rules] == sorted({finding.code for finding in expected})
     for rule in rules:
         assert rule["name"] == CATALOGUE[rule["id"]].name
         page = CATALOGUE.page(rule["id"])

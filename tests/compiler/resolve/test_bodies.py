@@ -30,9 +30,9 @@ def inertial_of(body: dict[str, Any], folder: Path | None = None) -> Inertial:
     compiled = compile_robot(text, file, PRESETS, disk=disk() if folder else None)
     assert not compiled.errors, compiled.errors
     assert compiled.robot
-    found = compiled.robot.links["base_link"].inertial
-    assert found
-    return found
+    inertial = compiled.robot.links["base_link"].inertial
+    assert inertial
+    return inertial
 
 
 def matrix(inertial: Inertial) -> Any:
@@ -67,8 +67,8 @@ def test_a_capsules_inertia_is_the_integral_over_its_slices(radius: float, lengt
 
     volume, expected = revolved(outline, -end - radius, end + radius, [-end, end])
     shape = {"capsule": {"radius": radius, "length": length}}
-    found = inertial_of({"visual": shape, "inertial": {"mass": 3}})
-    assert matrix(found) == pytest.approx(3 / volume * expected, rel=1e-7)
+    inertial = inertial_of({"visual": shape, "inertial": {"mass": 3}})
+    assert matrix(inertial) == pytest.approx(3 / volume * expected, rel=1e-7)
     assert inertial_of({"visual": shape, "inertial": {"density": 3}}).mass == pytest.approx(
         3 * volume, rel=1e-9
     )
@@ -76,17 +76,17 @@ def test_a_capsules_inertia_is_the_integral_over_its_slices(radius: float, lengt
 
 @given(sizes, sizes)
 @settings(max_examples=10, deadline=None)
-def test_a_cylinders_and_a_spheres_inertia_are_the_integrals_over_their_slices(
+def test_inertia_of_a_cylinder_and_a_sphere_equals_the_integral_of_slices(
     radius: float, length: float
 ) -> None:
     volume, expected = revolved(lambda _: radius, -length / 2, length / 2, [])
-    found = inertial_of(
+    inertial = inertial_of(
         {"visual": {"cylinder": {"radius": radius, "length": length}}, "inertial": {"mass": 3}}
     )
-    assert matrix(found) == pytest.approx(3 / volume * expected, rel=1e-8)
+    assert matrix(inertial) == pytest.approx(3 / volume * expected, rel=1e-8)
     volume, expected = revolved(lambda z: math.sqrt(radius**2 - z * z), -radius, radius, [])
-    found = inertial_of({"visual": {"sphere": {"radius": radius}}, "inertial": {"mass": 3}})
-    assert matrix(found) == pytest.approx(3 / volume * expected, rel=1e-6)
+    inertial = inertial_of({"visual": {"sphere": {"radius": radius}}, "inertial": {"mass": 3}})
+    assert matrix(inertial) == pytest.approx(3 / volume * expected, rel=1e-6)
 
 
 angles = st.tuples(*[st.floats(-3, 3)] * 3)
@@ -109,11 +109,11 @@ def test_several_turned_boxes_have_the_inertia_of_their_triangles(given: list[An
         shapes.append({"box": list(size), "xyz": list(xyz), "rpy": list(rpy)})
     full: Any = trimesh.util.concatenate(meshes)
     full.density = 7.0
-    found = inertial_of({"collision": shapes, "inertial": {"density": 7}})
-    assert found.mass == pytest.approx(7 * full.volume, rel=1e-9)
-    assert found.pose.xyz == pytest.approx(tuple(full.center_mass), abs=1e-9)
-    lost = 1e-13 * found.mass * 100  # trimesh integrates about the origin, up to 10 m away
-    assert matrix(found) == pytest.approx(full.moment_inertia, rel=1e-8, abs=lost)
+    inertial = inertial_of({"collision": shapes, "inertial": {"density": 7}})
+    assert inertial.mass == pytest.approx(7 * full.volume, rel=1e-9)
+    assert inertial.pose.xyz == pytest.approx(tuple(full.center_mass), abs=1e-9)
+    lost = 1e-13 * inertial.mass * 100  # trimesh integrates about the origin, up to 10 m away
+    assert matrix(inertial) == pytest.approx(full.moment_inertia, rel=1e-8, abs=lost)
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
@@ -146,9 +146,7 @@ def test_a_mesh_has_the_inertia_of_the_box_that_it_shows(
 
 
 @pytest.mark.parametrize("inwards", [False, True])
-def test_a_body_in_a_mesh_that_faces_inwards_is_turned_and_a_cavity_is_none(
-    tmp_path: Path, *, inwards: bool
-) -> None:
+def test_an_inward_mesh_is_flipped_but_a_cavity_is_kept(tmp_path: Path, *, inwards: bool) -> None:
     """In the hole of a ring it stands apart, though it is within the ring's bounds.
 
     In the box it is a hole.
@@ -165,9 +163,11 @@ def test_a_body_in_a_mesh_that_faces_inwards_is_turned_and_a_cavity_is_none(
     if inwards:
         mesh.invert()
     mesh.export(tmp_path / "several.stl")
-    found = inertial_of({"visual": {"mesh": "several.stl"}, "inertial": {"density": 1}}, tmp_path)
-    assert found.mass == pytest.approx(expected, rel=1e-6)
-    assert found.pose.xyz == pytest.approx((x, 0, 0), abs=1e-6)
+    inertial = inertial_of(
+        {"visual": {"mesh": "several.stl"}, "inertial": {"density": 1}}, tmp_path
+    )
+    assert inertial.mass == pytest.approx(expected, rel=1e-6)
+    assert inertial.pose.xyz == pytest.approx((x, 0, 0), abs=1e-6)
 
 
 @pytest.mark.filterwarnings(
@@ -196,12 +196,12 @@ def test_a_given_centre_of_mass_is_kept_with_the_tensor_of_the_shapes() -> None:
 
 def test_a_tensor_that_is_given_keeps_its_products_and_its_frame() -> None:
     tensor = {"ixx": 1, "ixy": 0.1, "ixz": -0.2, "iyy": 1.5, "iyz": 0.3, "izz": 2}
-    found = inertial_of(
+    inertial = inertial_of(
         {"inertial": {"mass": 2, "inertia": tensor, "xyz": [1, 0, 0], "rpy": [0, 0, "90 deg"]}}
     )
-    assert found.tensor == (1, 0.1, -0.2, 1.5, 0.3, 2)
-    assert found.pose.xyz == (1, 0, 0)
-    assert found.pose.rpy == pytest.approx((0, 0, math.pi / 2))
+    assert inertial.tensor == (1, 0.1, -0.2, 1.5, 0.3, 2)
+    assert inertial.pose.xyz == (1, 0, 0)
+    assert inertial.pose.rpy == pytest.approx((0, 0, math.pi / 2))
 
 
 def test_computing_leaves_no_noise_in_products_that_are_nothing() -> None:

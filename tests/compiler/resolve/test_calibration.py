@@ -35,9 +35,9 @@ ROTATION = Rotation.from_euler("xyz", [0.3, -0.5, 1.1])
 QUAT = [float(part) for part in ROTATION.as_quat()]
 XYZ = [0.12, -0.34, 0.56]
 MEASURED = Pose((0.12, -0.34, 0.56), (QUAT[0], QUAT[1], QUAT[2], QUAT[3]))
-ROWS = [[*map(float, row), at] for row, at in zip(ROTATION.as_matrix(), XYZ, strict=True)] + [
-    [0.0, 0.0, 0.0, 1.0]
-]
+ROWS = [
+    [*map(float, row), offset] for row, offset in zip(ROTATION.as_matrix(), XYZ, strict=True)
+] + [[0.0, 0.0, 0.0, 1.0]]
 
 
 def compiled(robot: str, **files: str) -> Compiled:
@@ -209,8 +209,8 @@ def test_degrees_and_radians_are_xacros_tags_and_other_tags_are_refused() -> Non
     values = "{x: 0, y: 0, z: 0, roll: !degrees 90, pitch: 0, yaw: !radians 0.5}"
     robot = "frames: {lens: {parent: base_link, calibration: c.yaml}}\n"
     edge = edge_of(compiled(robot, c_yaml=f"base_link: {{lens: {values}}}\n"), "lens")
-    wanted = Rotation.from_euler("xyz", [math.pi / 2, 0, 0.5])
-    assert (wanted.inv() * Rotation.from_quat(edge.pose.quat_xyzw)).magnitude() < 1e-12
+    expected = Rotation.from_euler("xyz", [math.pi / 2, 0, 0.5])
+    assert (expected.inv() * Rotation.from_quat(edge.pose.quat_xyzw)).magnitude() < 1e-12
     for wrong in (
         "!degrees a",
         "!degrees 90/2",
@@ -232,9 +232,7 @@ KALIBR = (
 )
 
 
-def test_kalibr_takes_points_from_the_imu_to_the_camera_and_so_gives_the_imu_in_the_camera() -> (
-    None
-):
+def test_kalibr_maps_imu_to_camera_and_gives_the_imu_in_the_camera() -> None:
     """A point at p in the IMU is at T_cam_imu p in the camera.
 
     The camera's pose in the IMU is the inverse.
@@ -293,7 +291,7 @@ def test_an_extrinsic_calibration_of_the_lens_solves_the_mount(form: str) -> Non
     assert mount.calibration.child == OPTICAL
 
 
-def test_a_calibration_in_another_frame_than_the_parent_is_solved_through_fixed_edges() -> None:
+def test_a_calibration_in_another_frame_is_solved_through_fixed_edges() -> None:
     robot = (
         "frames: {kit: {parent: base_link, xyz: [1, 0, 0], look: left}, lens: {parent: kit,"
         " calibration: %s}}\n"
@@ -435,7 +433,7 @@ PROBLEMS = {
 @pytest.mark.parametrize(
     ("code", "text"), [(code, text) for code, texts in PROBLEMS.items() for text in texts]
 )
-def test_what_cannot_be_used_is_reported_where_the_file_is_named_with_a_note_into_it(
+def test_an_unusable_file_is_reported_at_its_name_with_a_note_into_it(
     code: str, text: str
 ) -> None:
     findings = compiled(
@@ -517,7 +515,7 @@ def test_the_nominal_pose_is_taken_to_the_frame_in_which_it_was_measured() -> No
     assert not {finding.code for finding in done.findings} & {"TF615", "TF616"}
 
 
-def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -> None:
+def test_the_nominal_pose_or_the_bodies_reveal_an_inverse() -> None:
     back = MEASURED.inverse()
     nominal = f"xyz: {list(back.xyz)}, quat_xyzw: {list(back.quat_xyzw)}, "
     robot = "frames: {lens: {parent: base_link, %scalibration: c.yaml}}\n"
@@ -540,10 +538,10 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     assert not compiled(robot % "", c_yaml=autoware()).findings
 
 
-@pytest.mark.parametrize(("length_m", "found"), [(3.0, set()), (1.0, {"TF615"})])
+@pytest.mark.parametrize(("length_m", "codes"), [(3.0, set()), (1.0, {"TF615"})])
 @pytest.mark.parametrize("kind", ["capsule", "mesh"])
 def test_a_calibration_is_outside_of_what_a_capsule_or_a_mesh_fills(
-    tmp_path: Path, kind: str, length_m: float, found: set[str]
+    tmp_path: Path, kind: str, length_m: float, codes: set[str]
 ) -> None:
     """The middle of a rod is 1 m up.
 
@@ -561,7 +559,7 @@ def test_a_calibration_is_outside_of_what_a_capsule_or_a_mesh_fills(
     done = compile_robot(
         robot, str(tmp_path / "r.yaml"), library(), read=lambda _: text, disk=disk()
     )
-    assert {finding.code for finding in done.findings} == found
+    assert {finding.code for finding in done.findings} == codes
 
 
 def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> None:
@@ -581,7 +579,7 @@ def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> Non
     assert [finding.code for finding in findings] == ["TF616"]
 
 
-def test_a_quaternion_that_fits_with_its_w_first_is_given_in_the_right_order() -> None:
+def test_a_quaternion_with_w_first_is_given_in_the_right_order() -> None:
     frames = (
         "frames: {lens: {parent: base_link, xyz: [0, 0, 0.05], rpy: [0, 0, 90 deg],"
         " calibration: c.yaml}}\n"
@@ -709,12 +707,12 @@ def mutated(draw: st.DrawFn) -> str:
     text = draw(st.sampled_from(TEXTS))
     for _ in range(draw(st.integers(1, 4))):
         lines = text.split("\n")
-        at = draw(st.integers(0, len(lines) - 1))
-        words = lines[at].split(" ")
+        index = draw(st.integers(0, len(lines) - 1))
+        words = lines[index].split(" ")
         words[draw(st.integers(0, len(words) - 1))] = draw(
             st.sampled_from(WORDS) | st.text(max_size=4)
         )
-        lines[at] = " ".join(words)
+        lines[index] = " ".join(words)
         if draw(st.booleans()):
             del lines[draw(st.integers(0, len(lines) - 1))]
         text = "\n".join(lines)
@@ -738,7 +736,7 @@ def test_any_change_of_a_calibration_file_gives_findings_and_a_robot(text: str, 
     settle(text, form)
 
 
-def test_of_two_files_that_measure_an_edge_the_first_is_taken_and_the_other_reported() -> None:
+def test_of_two_files_for_an_edge_the_first_counts_and_one_is_reported() -> None:
     files = {"a_yaml": message(), "b_yaml": message().replace("0.12", "0.13")}
     result = compiled(
         "calibrations: [a.yaml, b.yaml]\nframes: {lens: {parent: base_link}}\n", **files

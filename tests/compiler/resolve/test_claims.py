@@ -127,7 +127,7 @@ CLAIMS: dict[str, tuple[str, str, dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize("more", CLAIMS)
-def test_what_a_node_publishes_and_another_owns_is_switched_off_in_that_nodes_parameters(
+def test_an_edge_of_another_owner_is_switched_off_in_the_nodes_parameters(
     more: str,
 ) -> None:
     process, node, switch = CLAIMS[more]
@@ -148,7 +148,7 @@ def test_the_node_of_several_that_publishes_an_edge_is_its_publisher() -> None:
     assert params_of(done, "ekf")["/r1/ekf"]["publish_tf"] is False
 
 
-def test_a_node_that_publishes_only_when_configured_is_configured_by_its_owner_alone() -> None:
+def test_only_the_owner_configures_a_node_that_publishes_on_demand() -> None:
     more = CONTROL.replace("diff_drive", "tricycle")
     assert params_of(compiled(more, **{"owner: ekf": "owner: control"}), "control")["/r1/diff"][
         "enable_odom_tf"
@@ -198,7 +198,7 @@ FINDINGS = {
 
 
 @pytest.mark.parametrize("more", FINDINGS)
-def test_a_claim_that_cannot_be_settled_is_one_finding_with_the_exact_switch(more: str) -> None:
+def test_an_unsettled_claim_is_one_finding_with_the_exact_switch(more: str) -> None:
     (finding,) = compiled(more).findings
     code, names, switch = FINDINGS[more]
     assert finding.code == code
@@ -226,14 +226,14 @@ def test_what_is_switched_off_or_allowed_is_no_finding(more: str) -> None:
     assert [line for line in output(done) if not line.startswith("TF815")] == []
 
 
-def test_an_owner_that_is_configured_not_to_publish_is_a_finding_at_the_parameter() -> None:
+def test_an_owner_configured_not_to_publish_is_a_finding_at_the_parameter() -> None:
     done = compiled(**{"node: {preset: ekf}": "node: {preset: ekf}, params: {publish_tf: false}"})
     (finding,) = done.findings
     assert finding.code == "TF333"
     assert {"ekf", "odom", "base_link", "publish_tf"} <= words(finding)
 
 
-def test_an_edge_that_no_node_of_its_owner_is_known_to_publish_is_a_finding() -> None:
+def test_an_edge_that_no_node_of_its_owner_publishes_is_a_finding() -> None:
     done = compiled(**{"owner: ekf": "owner: slam"})
     (finding,) = [entry for entry in done.findings if entry.code == "TF332"]
     assert {"slam", "odom", "base_link"} <= words(finding)
@@ -285,7 +285,7 @@ def test_the_frames_parameters_and_their_defaults_are_the_vendors(name: str) -> 
     assert {role.parameter: role.default for role in roles if role.parameter} == FACTS[name]
 
 
-def test_a_switch_that_the_user_sets_otherwise_is_not_overwritten_in_silence() -> None:
+def test_a_switch_that_the_user_sets_is_not_overwritten_silently() -> None:
     text = (
         "tfcompose: 1\nrobot: r\nframes: {odom: {}, base_link: {parent: odom, owner:"
         " ekf}}\nprocesses:\n  ekf: {external: true}\n  drive:\n    run: RUN\n    params: {tf:"

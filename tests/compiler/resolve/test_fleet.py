@@ -50,8 +50,8 @@ def test_the_robot_is_that_of_its_name_or_of_another_and_is_restarted() -> None:
         False,
         None,
     )
-    other = ROBOT.replace("fleets/fleet.yaml", "{file: fleets/fleet.yaml, robot: r2}")
-    below = other.replace("robot: rover", "robot: rover\nros: {namespace: two, isolate: both}")
+    renamed = ROBOT.replace("fleets/fleet.yaml", "{file: fleets/fleet.yaml, robot: r2}")
+    below = renamed.replace("robot: rover", "robot: rover\nros: {namespace: two, isolate: both}")
     assert share_of(below).argv[-4:] == (
         "r2",
         "${file:robots/fleets/fleet.yaml}",
@@ -60,7 +60,7 @@ def test_the_robot_is_that_of_its_name_or_of_another_and_is_restarted() -> None:
     )
 
 
-def test_it_waits_for_the_router_of_its_robot_and_runs_on_the_host_of_static_or_its_own() -> None:
+def test_it_waits_for_its_router_and_runs_on_its_host_or_that_of_static() -> None:
     hosts = "hosts: {brain: {}, rear: {}}\nros: {rmw: zenoh, router: tcp/10.0.0.2:7447}\nframes:"
     text = ROBOT.replace("frames:", hosts, 1).replace(
         "processes:", "processes:\n  static: {host: brain}"
@@ -105,6 +105,6 @@ def test_what_is_wrong_with_the_fleets_file_is_found(
     "edit", [("parent: odom", "parnt: odom"), ("frames:", "frames: {gps: {}}\nframes:")]
 )
 def test_edges_are_not_missed_in_a_robot_that_is_refused(edit: tuple[str, str]) -> None:
-    found = compiled(ROBOT.replace(*edit))
-    assert "TF887" not in {entry.code for entry in found.findings}
-    assert found.errors
+    result = compiled(ROBOT.replace(*edit))
+    assert "TF887" not in {entry.code for entry in result.findings}
+    assert result.errors

@@ -167,7 +167,7 @@ def test_an_urdf_is_taken_twice_with_everything_in_it_renamed(cell: Any) -> None
     }
 
 
-def test_a_shape_is_there_though_readers_of_the_urdf_alone_would_stumble_over_its_tabs(
+def test_a_shape_with_tabs_is_kept_though_urdf_readers_may_fail_on_it(
     cell: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "plate.urdf").write_text(
@@ -188,14 +188,14 @@ def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_p
         full = text.format(name, kind) + f'<child link="{name}_b"/></joint></robot>'
         (tmp_path / f"{name}.urdf").write_text(full, encoding="utf-8")
     first, two = "one: {urdf: one.urdf, parent: table}", "two: {urdf: two.urdf, parent: table}"
-    (found,) = cell(first, two).findings
-    assert found.code == "TF505"
-    assert {"two", "j"} <= words(found)
-    assert [note.span.file.rpartition("/")[2] for note in found.notes if note.span] == [
+    (finding,) = cell(first, two).findings
+    assert finding.code == "TF505"
+    assert {"two", "j"} <= words(finding)
+    assert [note.span.file.rpartition("/")[2] for note in finding.notes if note.span] == [
         "one.urdf",
         "two.urdf",
     ]
-    assert "prefix: two/" in found.help
+    assert "prefix: two/" in finding.help
     assert sound(cell(first, two.replace("parent", "prefix: t_, parent")))
 
 
@@ -225,7 +225,7 @@ def test_what_is_about_links_and_joints_that_are_removed_is_removed_too(
     ]
 
 
-def test_names_with_other_characters_are_taken_from_others_and_renamed_everywhere(
+def test_foreign_names_with_other_characters_are_renamed_everywhere(
     cell: Any, tmp_path: Path
 ) -> None:
     text = ARM.replace('"upper"', '"upper &amp; &lt;arm&gt;"').replace(
@@ -246,9 +246,9 @@ def test_a_block_of_a_macro_is_a_pose_as_everywhere(cell: Any) -> None:
     pose = "{xyz: [10 cm, 0, 2], look: {down: 30 deg}}"
     params = f"{{name: front, parent_link: table, origin: {pose}}}"
     robot = sound(cell(f"mast: {{xacro: third/arm/mast.xacro, macro: mast, params: {params}}}"))
-    found = robot.parent_edge("front_mast").pose
-    assert found.xyz == (0.1, 0, 2)
-    assert found.rpy == pytest.approx((0, np.pi / 6, 0), abs=1e-15)
+    mast_pose = robot.parent_edge("front_mast").pose
+    assert mast_pose.xyz == (0.1, 0, 2)
+    assert mast_pose.rpy == pytest.approx((0, np.pi / 6, 0), abs=1e-15)
 
 
 def test_a_macro_takes_its_parent_and_its_origin_from_the_part(cell: Any) -> None:
@@ -279,17 +279,17 @@ def test_a_macro_takes_its_parent_and_its_origin_from_the_part(cell: Any) -> Non
     assert prefixed.parent_edge("b").pose.xyz == (0.1, 0, 2)
 
 
-def test_a_macro_that_is_not_simply_fixed_to_its_parent_is_given_it_by_hand(cell: Any) -> None:
+def test_a_macro_not_simply_fixed_to_its_parent_gets_the_parent_by_hand(cell: Any) -> None:
     part = "other: {xacro: third/arm/pole.xacro, macro: leaning, parent: table, params: {name: b}}"
-    (found,) = cell(part).errors
-    assert (found.code, found.span.line) == ("TF313", 7)
+    (finding,) = cell(part).errors
+    assert (finding.code, finding.span.line) == ("TF313", 7)
     by_hand = (
         "other: {xacro: third/arm/pole.xacro, macro: leaning, params: {name: b, parent: table}}"
     )
     assert sound(cell(by_hand)).parent_edge("b").pose.xyz == (0, 0, 1)
 
 
-def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
+def test_xacro_finds_a_package_of_the_robot_with_relative_paths(
     cell: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert cell  # writes the package
@@ -319,12 +319,16 @@ def test_what_xacro_cannot_find_is_reported_once(
 ) -> None:
     slide = tmp_path / "third/arm/slide.xacro"
     slide.write_text(XACRO.replace("$(find arm)/sizes.xacro", find), "utf-8")
-    (found,) = cell("slide: {xacro: third/arm/slide.xacro, parent: table}").errors
-    assert (found.code, found.message.count(message), found.message.count("Error")) == (code, 1, 0)
-    assert found.span.file.endswith("cell.yaml")
+    (finding,) = cell("slide: {xacro: third/arm/slide.xacro, parent: table}").errors
+    assert (finding.code, finding.message.count(message), finding.message.count("Error")) == (
+        code,
+        1,
+        0,
+    )
+    assert finding.span.file.endswith("cell.yaml")
 
 
-def test_a_part_of_which_nothing_is_left_because_its_own_part_was_refused_says_nothing(
+def test_a_part_emptied_by_a_refused_part_reports_nothing(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "inner.yaml").write_text(
@@ -354,26 +358,26 @@ def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(
         f' name="w"/>{call}</robot>'
     )
     (tmp_path / "third/arm/outer.xacro").write_text(outer, "utf-8")
-    (found,) = cell("o: {xacro: third/arm/outer.xacro, parent: table}").findings
-    assert "'hight'" in found.message
-    assert [note.span and note.span.file.endswith("mast.xacro") for note in found.notes] == [
+    (finding,) = cell("o: {xacro: third/arm/outer.xacro, parent: table}").findings
+    assert "'hight'" in finding.message
+    assert [note.span and note.span.file.endswith("mast.xacro") for note in finding.notes] == [
         True,
         True,
         False,
     ]
-    assert [note.message.rpartition(" ")[2] for note in found.notes[1:]] == ["mast", "o"]
-    line = MACRO.splitlines()[found.notes[0].span.line - 1]
-    assert line[found.notes[0].span.column - 1 :].startswith("${height}")
+    assert [note.message.rpartition(" ")[2] for note in finding.notes[1:]] == ["mast", "o"]
+    line = MACRO.splitlines()[finding.notes[0].span.line - 1]
+    assert line[finding.notes[0].span.column - 1 :].startswith("${height}")
 
 
-def test_a_floating_joint_of_a_foreign_file_is_reported_where_it_can_have_an_owner(
+def test_a_foreign_floating_joint_is_reported_where_it_can_have_an_owner(
     cell: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "third/arm/arm.urdf").write_text(
         ARM.replace('name="end" type="fixed"', 'name="end" type="floating"')
     )
-    (found,) = cell(LEFT).findings
-    assert (found.code, "tfcompose import" in found.help) == ("TF715", True)
+    (finding,) = cell(LEFT).findings
+    assert (finding.code, "tfcompose import" in finding.help) == ("TF715", True)
 
 
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
@@ -412,7 +416,7 @@ def test_every_frame_is_where_an_independent_reader_of_the_urdf_has_it(
         assert got == pytest.approx(theirs.get_transform("tip", "base"), abs=1e-9)
 
 
-def test_moving_joints_go_to_joints_and_fixed_ones_to_static_under_their_new_names(
+def test_moving_joints_go_to_joints_and_fixed_ones_to_static_once_renamed(
     cell: Any,
 ) -> None:
     plan = read_plan(files(cell(LEFT))["plan.json"], "plan.json")
@@ -447,7 +451,7 @@ def test_an_urdf_can_be_a_robot_of_its_own(cell: Any) -> None:
     assert '<link name="upper"/>' in out["left/robot.urdf"]
 
 
-def test_a_xacro_file_is_expanded_with_arguments_and_the_robots_own_packages(cell: Any) -> None:
+def test_xacro_expands_with_arguments_and_the_robots_own_packages(cell: Any) -> None:
     robot = sound(
         cell(
             "slide: {xacro: package://arm/slide.xacro, args: {reach: 0.75}, parent: table,"
@@ -494,7 +498,7 @@ def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(
     assert result.findings[1].message.split()[-1] == "tabel"
 
 
-def test_what_is_wrong_with_hardware_of_a_part_is_reported_at_its_line_with_every_use(
+def test_bad_hardware_of_a_part_is_reported_at_its_line_with_every_use(
     cell: Any, tmp_path: Path
 ) -> None:
     joint = '\n    <joint name="shoulder"><command_interface name="position"/></joint>'
@@ -505,22 +509,25 @@ def test_what_is_wrong_with_hardware_of_a_part_is_reported_at_its_line_with_ever
     file = tmp_path / "third/arm/arm.urdf"
     file.write_text(ARM.replace("</robot>", f"{control}</robot>"), encoding="utf-8")
     mine = "{shoulder: {command: {position: {}}}}".replace("shoulder", "left_shoulder")
-    (found,) = cell(
+    (finding,) = cell(
         LEFT, f"{RIGHT}\nros2_control: {{mine: {{plugin: a/B, joints: {mine}}}}}"
     ).findings
-    assert found.code == "TF717"
-    assert found.span
+    assert finding.code == "TF717"
+    assert finding.span
     assert (
         file.read_text(encoding="utf-8")
-        .splitlines()[found.span.line - 1][found.span.column - 1 :]
+        .splitlines()[finding.span.line - 1][finding.span.column - 1 :]
         .startswith('<joint name="shoulder"')
     )
-    assert [note.message for note in found.notes][1:] == ["as the part left", "as the part right"]
+    assert [note.message for note in finding.notes][1:] == [
+        "as the part left",
+        "as the part right",
+    ]
     (full,) = cell(
         f"{LEFT.replace('root: base, ', '')}\nros2_control: {{mine: {{plugin: a/B, joints:"
         f" {mine}}}}}"
     ).findings
-    assert (full.code, full.span) == ("TF717", found.span)
+    assert (full.code, full.span) == ("TF717", finding.span)
 
 
 def test_a_block_that_names_nothing_of_its_part_stands_once(cell: Any) -> None:
@@ -539,9 +546,9 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(
     file.write_text(ARM.replace('ixx="0.02" iyy="0.02"', 'ixx="9" iyy="9"'), encoding="utf-8")
     assert cell(LEFT).findings == ()
     file.write_text(ARM.replace('parent link="finger"', 'parent link="fingr"'), encoding="utf-8")
-    (found,) = cell(LEFT.replace("root: base, ", "")).errors
-    assert (found.code, found.span.file) == ("TF203", str(file))
-    assert found.notes[-1].message == "as the part left"
+    (finding,) = cell(LEFT.replace("root: base, ", "")).errors
+    assert (finding.code, finding.span.file) == ("TF203", str(file))
+    assert finding.notes[-1].message == "as the part left"
 
 
 @pytest.mark.parametrize(
@@ -681,7 +688,7 @@ def test_what_cannot_be_a_part_is_reported_with_its_place(  # noqa: PLR0913, PLR
     assert errors[0].span.file.endswith(place)
 
 
-def test_a_file_of_the_robot_is_named_in_arguments_of_xacro_and_parameters_of_a_macro(
+def test_a_robots_file_is_named_in_xacro_arguments_and_macro_parameters(
     cell: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "config").mkdir()

@@ -45,7 +45,7 @@ def test_what_nobody_says_is_not_known() -> None:
     assert not image.sources
 
 
-def test_a_user_says_what_a_generic_sensor_sees_and_the_place_of_it_is_its_source() -> None:
+def test_the_field_of_view_of_a_generic_sensor_comes_from_the_users_file() -> None:
     optics = optics_in(
         compiled(
             "preset: generic/camera, optics: {image: {horizontal: 90 deg, resolution: [640, 480]}}"
@@ -76,7 +76,7 @@ def test_a_scanner_in_one_plane_has_a_sector_and_no_height() -> None:
     )
 
 
-def test_elevations_say_how_many_channels_there_are_and_how_high_they_reach() -> None:
+def test_elevations_give_the_number_of_channels_and_their_range() -> None:
     lidar = "preset: generic/lidar3d, optics: {cloud: {elevations: [-15 deg, 0, 5 deg]}}"
     cloud = optics_in(compiled(lidar))["cloud"]
     assert cloud.channels == 3

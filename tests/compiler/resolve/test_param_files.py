@@ -62,13 +62,13 @@ def test_parameters_of_the_file_come_in_order_below_inline_ones() -> None:
     assert "not_mine" not in output
 
 
-def test_what_a_file_says_to_other_nodes_of_the_process_is_passed_on_in_its_order() -> None:
+def test_sections_for_other_nodes_of_the_process_pass_on_in_order() -> None:
     params = yaml.safe_load(source_text("{file: p.yaml, own: x}"))
     assert list(params) == ["/**", "planner", "robot1/costmap", "/*/planner", "/robot1/planner"]
     assert params["robot1/costmap"]["ros__parameters"] == {"radius": 0.3}
 
 
-def test_sections_of_several_files_have_the_order_in_which_their_names_come_first() -> None:
+def test_sections_of_several_files_keep_the_order_of_their_first_names() -> None:
     """As rcl keeps them: /** of the second file counts where the first one has it."""
     first = "/**: {ros__parameters: {a: 1}}\n/robot1/planner: {ros__parameters: {a: 2}}\n"
     text = source_text("{file: [p.yaml, q.yaml]}", p=first, q="/**: {ros__parameters: {a: 3}}\n")
@@ -123,7 +123,7 @@ def test_a_parameter_that_contradicts_the_clock_is_found_where_it_is_given(
     assert "TF335" not in {entry.code for entry in over.findings}
 
 
-def test_a_name_in_the_file_is_the_full_one_with_and_without_a_leading_slash() -> None:
+def test_a_name_in_the_file_is_full_with_or_without_a_leading_slash() -> None:
     file = "planner: {ros__parameters: {a: 1}}\nrobot1/front/planner: {ros__parameters: {b: 1}}\n"
     params = yaml.safe_load(source_text("{file: front.yaml}, namespace: front", front=file))
     assert params["/robot1/front/planner"] == {"ros__parameters": {"b": 1}}
@@ -153,8 +153,8 @@ def test_the_digest_of_the_plan_changes_with_the_file() -> None:
             next(file.text for file in emit(robot) if file.path == "plan.json"), "p"
         ).spec_digest
 
-    first, other = "/**: {ros__parameters: {a: 1}}", "/**: {ros__parameters: {a: 2}}"
-    assert digest(first) == digest(first) != digest(other)
+    first, changed = "/**: {ros__parameters: {a: 1}}", "/**: {ros__parameters: {a: 2}}"
+    assert digest(first) == digest(first) != digest(changed)
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_what_is_no_parameter_of_the_node_is_a_finding(
     assert name in findings[0].message
 
 
-def test_of_several_files_one_need_not_name_the_node_but_none_is_a_warning_for_each() -> None:
+def test_of_several_files_one_must_name_the_node_or_each_gives_a_warning() -> None:
     files = {
         "q": "/**/planner: {ros__parameters: {a: 1}}",
         "common": "other: {ros__parameters: {a: 1}}",
@@ -243,7 +243,7 @@ def test_any_text_is_a_parameter_file_or_a_finding(text: str) -> None:
         load_params(text, "p.yaml")
 
 
-def test_a_file_that_is_nested_too_deep_is_refused_and_does_not_end_the_interpreter() -> None:
+def test_a_file_nested_too_deep_is_refused_and_the_interpreter_survives() -> None:
     deep = f"p: {{ros__parameters: {{x: {'[' * 200_000}}}}}"
     with pytest.raises(RejectedError) as rejected:
         load_params(deep, "deep.yaml")

@@ -128,7 +128,7 @@ def test_two_robots_from_one_file_share_a_map_and_nothing_else() -> None:
         )
 
 
-def test_processes_of_a_part_are_in_its_namespace_and_know_final_frame_names() -> None:
+def test_processes_of_a_part_use_its_namespace_and_final_frame_names() -> None:
     files = built(FLEET)
     plan = read_plan(files["plan.json"], "plan.json")
     slam = plan.process("one/slam")
@@ -142,7 +142,7 @@ def test_processes_of_a_part_are_in_its_namespace_and_know_final_frame_names() -
     assert '"tf_prefix": "r2/"' in files["params/two/camera.yaml"]
 
 
-def test_a_robot_of_its_own_has_its_own_publishers_description_and_joint_names() -> None:
+def test_an_own_robot_has_its_own_publishers_description_and_joint_names() -> None:
     files = built(FLEET)
     plan = read_plan(files["plan.json"], "plan.json")
     assert plan.process("one/joints").description == "one/robot.urdf"
@@ -165,7 +165,7 @@ def test_a_robot_of_its_own_has_its_own_publishers_description_and_joint_names()
     assert mimics == {"r1/wheel_joint", "r2/wheel_joint"}
 
 
-def test_isolated_topics_are_each_robots_own_also_for_what_somebody_else_starts() -> None:
+def test_isolated_topics_belong_to_each_robot_even_for_external_nodes() -> None:
     files = built(FLEET.replace("[map]}", "[map], isolate: topics}"))
     plan = read_plan(files["plan.json"], "plan.json")
     moved = {process.name: process.remap.get("/tf", "/tf") for process in plan.processes}
@@ -234,11 +234,11 @@ def test_a_part_is_placed_by_a_calibration_of_a_frame_in_it() -> None:
 
 
 def test_a_joint_on_the_way_to_the_placed_frame_is_named() -> None:
-    found = only(compiled(CELL.replace("EXTRA", "place: left_tool")), "TF404")
-    assert "left_shoulder" in words(found)
+    finding = only(compiled(CELL.replace("EXTRA", "place: left_tool")), "TF404")
+    assert "left_shoulder" in words(finding)
 
 
-def test_an_outer_frame_hangs_on_a_part_and_a_free_root_gets_its_edge_outside() -> None:
+def test_an_outer_frame_hangs_on_a_part_and_a_free_root_gets_an_outer_edge() -> None:
     text = (
         CELL.replace("parent: table, EXTRA", "")
         + "frames: {left_foot: {parent: table, xyz: [0, 0, 1]}, tip: {parent: left_tool}}\n"
@@ -290,7 +290,7 @@ def test_drivers_of_sensors_that_are_removed_are_removed_and_others_stay() -> No
     assert "left_low_link" not in trimmed.frames
 
 
-def test_a_parameter_that_names_a_frame_or_joint_goes_with_it_and_no_other_does() -> None:
+def test_only_parameters_that_name_a_frame_or_joint_are_renamed() -> None:
     """As in the raw block of a URDF part, so that both forms of an arm move alike."""
     shoulder = (
         "shoulder: {command: [position], state: {effort: {source: shoulder}}, params: {mimic:"
@@ -300,11 +300,11 @@ def test_a_parameter_that_names_a_frame_or_joint_goes_with_it_and_no_other_does(
         "ros2_control: {h: {plugin: a/B, params: {tip: upper, port: upper_1}, joints:"
         f" {{{shoulder}}}}}}}\n"
     )
-    (found,) = sound(
+    (node,) = sound(
         CELL.replace("EXTRA", ""), arm_yaml=ARM.replace("processes:", f"{hardware}processes:")
     ).hardware
-    (joint,) = found.components
-    assert found.params == {"tip": "left_upper", "port": "upper_1"}
+    (joint,) = node.components
+    assert node.params == {"tip": "left_upper", "port": "upper_1"}
     assert joint.params == {"mimic": "left_shoulder", "k": "1"}
     assert joint.state[0].params == {"source": "shoulder"}
 
@@ -350,17 +350,17 @@ def test_the_digest_changes_with_the_parts_file() -> None:
 
 
 def test_a_name_that_both_robots_bring_is_refused_with_both_places() -> None:
-    found = only(compiled(FLEET.replace("prefix: r2/, ", "prefix: r1/, ")), "TF505")
-    assert "two" in words(found)
-    assert "r1/" in found.message
-    assert {note.span.file for note in found.notes if note.span} == {"robots/rover.yaml"}
-    assert found.span.file == "fleet.yaml"
+    finding = only(compiled(FLEET.replace("prefix: r2/, ", "prefix: r1/, ")), "TF505")
+    assert "two" in words(finding)
+    assert "r1/" in finding.message
+    assert {note.span.file for note in finding.notes if note.span} == {"robots/rover.yaml"}
+    assert finding.span.file == "fleet.yaml"
 
 
 def test_a_frame_that_is_not_shared_gets_the_prefix() -> None:
     result = compiled(FLEET.replace("ros: {shared_frames: [map]}\n", ""))
-    found = only(result, "TF204")
-    assert "r1/map" in found.message
+    finding = only(result, "TF204")
+    assert "r1/map" in finding.message
 
 
 @pytest.mark.parametrize(
@@ -390,10 +390,10 @@ def test_what_does_not_fit_is_reported_once_with_its_place(
     old: str, new: str, code: str, message: str, place: str
 ) -> None:
     result = compiled(FLEET.replace(old, new))
-    found = only(result, code)
-    assert message in found.message
-    assert found.span
-    assert place in found.span.file
+    finding = only(result, code)
+    assert message in finding.message
+    assert finding.span
+    assert place in finding.span.file
     assert len(result.errors) == 1
 
 
@@ -406,14 +406,14 @@ def test_what_a_missing_part_would_have_brought_is_not_missed_too() -> None:
 
 def test_a_clock_of_the_parts_own_is_refused() -> None:
     rover = ROVER + "ros: {clock: sim}\n"
-    found = only(compiled(FLEET, **{"robots/rover_yaml": rover}), "TF312")
-    assert found.span.file == "fleet.yaml"
-    assert found.notes[0].span.file == "robots/rover.yaml"
+    finding = only(compiled(FLEET, **{"robots/rover_yaml": rover}), "TF312")
+    assert finding.span.file == "fleet.yaml"
+    assert finding.notes[0].span.file == "robots/rover.yaml"
 
 
 def test_a_fault_in_the_parts_file_is_reported_there_and_names_the_part() -> None:
     rover = ROVER.replace("xyz: [0, 0.2, 0]", "xyz: [0, 0.2]")
-    finding, *others = (
+    finding, *further = (
         entry
         for entry in compiled(FLEET, **{"robots/rover_yaml": rover}).findings
         if entry.code == "TF103"
@@ -421,7 +421,7 @@ def test_a_fault_in_the_parts_file_is_reported_there_and_names_the_part() -> Non
     assert finding.span
     assert finding.span.file == "robots/rover.yaml"
     assert [note.message for note in finding.notes][-2:] == ["as the part one", "as the part two"]
-    assert not others
+    assert not further
 
 
 def test_a_finding_of_a_rule_about_the_parts_file_names_the_parts() -> None:

@@ -38,19 +38,19 @@ def edge_of(robot: Robot, child: str) -> Edge:
 
 def pose_in_root(robot: Robot, frame: str) -> tuple[Rotation, Any]:
     """Return rotation and position of the frame in its root, computed by scipy."""
-    rotation, at = Rotation.identity(), [0.0, 0.0, 0.0]
+    rotation, xyz = Rotation.identity(), [0.0, 0.0, 0.0]
     while edge := robot.parent_edge(frame):
-        own = Rotation.from_quat(edge.pose.quat_xyzw)
-        rotation, at = own * rotation, own.apply(at) + edge.pose.xyz
+        edge_rotation = Rotation.from_quat(edge.pose.quat_xyzw)
+        rotation, xyz = edge_rotation * rotation, edge_rotation.apply(xyz) + edge.pose.xyz
         frame = edge.parent
-    return rotation, at
+    return rotation, xyz
 
 
-def assert_rotation(found: Rotation, expected: Rotation) -> None:
-    assert (found.inv() * expected).magnitude() < 1e-9
+def assert_rotation(actual: Rotation, expected: Rotation) -> None:
+    assert (actual.inv() * expected).magnitude() < 1e-9
 
 
-def test_a_pose_relative_to_another_frame_is_there_while_the_parent_stays_the_parent() -> None:
+def test_a_pose_relative_to_another_frame_keeps_the_parent() -> None:
     robot = robot_of(
         "frames:\n"
         "  mast: {parent: base_link, xyz: [1, 2, 3], rpy: [0, 0, 90 deg]}\n"
@@ -58,15 +58,15 @@ def test_a_pose_relative_to_another_frame_is_there_while_the_parent_stays_the_pa
         "  sign: {parent: plate, relative_to: mast, xyz: [1, 0, 0], rpy: [5 deg, 0, 0]}\n"
     )
     assert edge_of(robot, "sign").parent == "plate"
-    rotation, at = pose_in_root(robot, "sign")
-    assert at == pytest.approx([1, 3, 3], abs=1e-12)
+    rotation, xyz = pose_in_root(robot, "sign")
+    assert xyz == pytest.approx([1, 3, 3], abs=1e-12)
     assert_rotation(
         rotation,
         Rotation.from_euler("z", 90, degrees=True) * Rotation.from_euler("x", 5, degrees=True),
     )
 
 
-def test_a_chain_of_five_hundred_relative_poses_is_solved_whatever_the_order() -> None:
+def test_five_hundred_chained_relative_poses_resolve_in_any_order() -> None:
     frames = ", ".join(
         f"f{n}: {{parent: base_link, relative_to: f{n + 1}, xyz: [1, 0, 0]}}" for n in range(500)
     )
@@ -84,10 +84,10 @@ def test_poses_relative_to_each_other_are_one_finding(count: int) -> None:
 
 
 @pytest.mark.parametrize("frame", ["c_link", "c_color_optical_frame", "c_bottom_screw_frame"])
-def test_the_placed_frame_is_where_the_pose_says_and_the_edge_is_the_mounts(frame: str) -> None:
+def test_the_pose_places_the_frame_and_the_edge_belongs_to_the_mount(frame: str) -> None:
     robot = robot_of(CAMERA % f"place: {frame}, xyz: [1, 2, 3], rpy: [10 deg, 20 deg, 30 deg]")
-    rotation, at = pose_in_root(robot, frame)
-    assert at == pytest.approx([1, 2, 3], abs=1e-12)
+    rotation, xyz = pose_in_root(robot, frame)
+    assert xyz == pytest.approx([1, 2, 3], abs=1e-12)
     assert_rotation(rotation, Rotation.from_euler("xyz", [10, 20, 30], degrees=True))
     assert edge_of(robot, "c_bottom_screw_frame").parent == "base_link"
 
@@ -96,7 +96,7 @@ def test_the_placed_frame_is_where_the_pose_says_and_the_edge_is_the_mounts(fram
     ("inspect", "direction"),
     [("forward", (1, 0, 0)), ("left", (0, 1, 0)), ("down", (0, 0, -1)), ("{down: 15 deg}", None)],
 )
-def test_the_view_is_the_z_axis_of_a_placed_optical_frame_and_the_x_axis_of_others(
+def test_an_optical_frame_views_along_z_and_other_frames_along_x(
     inspect: str, direction: tuple[int, ...] | None
 ) -> None:
     expected = direction or tuple(Rotation.from_euler("y", 15, degrees=True).apply([1, 0, 0]))
@@ -228,16 +228,16 @@ def test_a_sensors_frame_takes_the_units_own_value_and_name() -> None:
     )
 
 
-def test_a_sensors_frame_takes_the_units_own_rotation_and_keeps_the_presets_place() -> None:
+def test_a_sensor_frame_takes_the_units_rotation_and_the_presets_place() -> None:
     robot = robot_of(CAMERA % "frames: {c_color_frame: {rpy: [1 deg, 2 deg, 3 deg]}}")
-    found = edge_of(robot, "c_color_frame").pose
-    assert found.xyz == (0, 0.015, 0)
+    pose = edge_of(robot, "c_color_frame").pose
+    assert pose.xyz == (0, 0.015, 0)
     assert_rotation(
-        Rotation.from_quat(found.quat_xyzw), Rotation.from_euler("xyz", [1, 2, 3], degrees=True)
+        Rotation.from_quat(pose.quat_xyzw), Rotation.from_euler("xyz", [1, 2, 3], degrees=True)
     )
 
 
-def test_to_place_through_nominal_values_is_a_warning_that_the_units_own_values_silence() -> None:
+def test_placing_by_nominal_values_warns_until_the_unit_has_its_own() -> None:
     place = "place: c_color_frame"
     assert [finding.code for finding in compiled(CAMERA % place).findings] == ["TF405"]
     assert not compiled(
@@ -285,6 +285,27 @@ def test_the_urdf_begins_at_base_link_or_a_fixed_base_footprint_above_it(
     frames: str, base: str
 ) -> None:
     assert robot_of(frames).base == base
+
+
+FOOTPRINT = "frames: {base_footprint: {}, base_link: {parent: base_footprint}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "ground"),
+    [
+        ("", None),
+        ("ground: base_link\n", "base_link"),
+        (FOOTPRINT, "base_footprint"),
+        (
+            f"ground: floor\n{FOOTPRINT[:-2]}, floor: {{parent: base_footprint}}}}\n",
+            "floor",
+        ),
+    ],
+)
+def test_the_floor_is_at_base_footprint_or_the_frame_that_the_file_names(
+    text: str, ground: str | None
+) -> None:
+    assert robot_of(text).ground == ground
 
 
 def test_rates_come_from_the_edge_or_from_the_process_behind_it() -> None:
@@ -352,7 +373,7 @@ processes: {changer: {external: true}}
 """
 
 
-def test_an_edge_with_several_parents_hangs_on_the_first_and_names_the_others_everywhere() -> None:
+def test_an_edge_with_several_parents_hangs_on_the_first_and_names_all() -> None:
     robot = robot_of(TOOL)
     edge = edge_of(robot, "tool")
     assert (edge.parent, edge.switched, edge.kind) == ("base_link", ("rack",), "dynamic")
@@ -392,7 +413,7 @@ def test_a_list_of_parents_has_different_names(parents: str) -> None:
     assert [finding.code for finding in findings if finding.code.startswith("TF1")] != []
 
 
-def test_a_frame_that_a_driver_sends_again_and_again_inside_a_sensor_can_be_placed() -> None:
+def test_a_frame_that_a_driver_sends_repeatedly_in_a_sensor_can_be_placed() -> None:
     """The inside of a sensor does not move, on whichever topic its driver sends it.
 
     What moves is refused.
@@ -406,7 +427,7 @@ def test_a_frame_that_a_driver_sends_again_and_again_inside_a_sensor_can_be_plac
     assert pose_in_root(robot, "z_left_camera_frame")[1] == pytest.approx([1, 0, 0])
 
 
-def test_a_condition_on_several_values_of_an_option_holds_only_for_all_of_them() -> None:
+def test_a_condition_on_several_values_of_an_option_needs_all_of_them() -> None:
     condition = {"streams": ["depth", "color"]}
     assert holds(condition, {"streams": ["color", "infra1", "depth"]}, "driver")
     assert not holds(condition, {"streams": ["depth"]}, "driver")
@@ -414,7 +435,7 @@ def test_a_condition_on_several_values_of_an_option_holds_only_for_all_of_them()
     assert holds({"tf": "driver"}, {}, "driver")
 
 
-def test_an_unknown_name_under_after_is_answered_with_the_processes_that_there_are() -> None:
+def test_an_unknown_name_under_after_is_answered_with_known_processes() -> None:
     done = compiled(
         "parts:\n"
         "  arm: {xacro: arm.xacro, parent: base_link}\n"

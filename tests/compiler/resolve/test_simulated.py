@@ -67,17 +67,17 @@ def tuples(sweeps: dict[str, Sweep]) -> object:
         ),
     ],
 )
-def test_every_joint_with_a_position_of_its_own_is_simulated_within_its_limits_and_its_speed(
+def test_every_independent_joint_moves_within_its_limits_and_speed(
     source_text: str, joints: dict[str, float], sweeps: dict[str, Sweep]
 ) -> None:
     """A joint that mimics one is left out.
 
     Where 0 is beyond the limits the middle counts, as elsewhere in ROS.
     """
-    found = simulation(source_text)
-    assert found
-    assert found.joints == pytest.approx(joints)
-    assert tuples(found.sweep) == approx(sweeps)
+    simulated = simulation(source_text)
+    assert simulated
+    assert simulated.joints == pytest.approx(joints)
+    assert tuples(simulated.sweep) == approx(sweeps)
 
 
 UNLIMITED = """
@@ -98,11 +98,11 @@ def test_without_limits_a_rotation_sweeps_all_round_and_a_slide_stays() -> None:
     assert not done.errors
     assert done.robot
     text = next(file.text for file in emit(done.robot) if file.path == "plan.json")
-    found = read_plan(text, "plan.json").process("states").simulate
-    assert found
-    assert found.joints == {"bend": 0.0, "half": 0.0, "lift": 0.0}
+    simulated = read_plan(text, "plan.json").process("states").simulate
+    assert simulated
+    assert simulated.joints == {"bend": 0.0, "half": 0.0, "lift": 0.0}
     sweeps = {"bend": Sweep(6.0, -math.pi, math.pi), "half": Sweep(math.pi / 0.1, -1.0, 0.0)}
-    assert tuples(found.sweep) == approx(sweeps)
+    assert tuples(simulated.sweep) == approx(sweeps)
 
 
 def test_a_slide_without_limits_cannot_sweep() -> None:

@@ -60,23 +60,23 @@ def test_a_rate_of_zero_is_that_of_all_as_ros2_control_reads_it() -> None:
         assert [element.get("rw_rate") for element in tree.iter("ros2_control")] == ["0"]
 
 
-def same(first: ET.Element, other: ET.Element) -> bool:
-    texts = [(element.text or "").strip() for element in (first, other)]
+def same(first: ET.Element, second: ET.Element) -> bool:
+    texts = [(element.text or "").strip() for element in (first, second)]
     return (first.tag, first.attrib, texts[0], len(first)) == (
-        other.tag,
-        other.attrib,
+        second.tag,
+        second.attrib,
         texts[1],
-        len(other),
-    ) and all(same(*pair) for pair in zip(first, other, strict=True))
+        len(second),
+    ) and all(same(*pair) for pair in zip(first, second, strict=True))
 
 
 def test_hardware_is_emitted_as_ros2_control_reads_it() -> None:
     for urdf in urdfs(HARDWARE):
-        (found,) = urdf.findall("ros2_control")
-        assert same(found, ET.fromstring(EXPECTED)), ET.tostring(found)  # noqa: S314 (as above)
+        (control,) = urdf.findall("ros2_control")
+        assert same(control, ET.fromstring(EXPECTED)), ET.tostring(control)  # noqa: S314 (as above)
 
 
-def test_the_joints_that_there_are_are_named_in_the_files_order_and_not_all_of_a_hundred() -> None:
+def test_known_joints_are_named_in_file_order_and_not_all_of_a_hundred() -> None:
     names = [f"j{number}" for number in range(100)]
     joints = "".join(
         f"  {name}: {{type: continuous, parent: base_link, child: {name}_link}}\n"

@@ -58,7 +58,7 @@ def test_an_expression_that_leads_to_python_is_refused_where_it_is(expression: s
     assert not Path("made").exists()
 
 
-def test_an_expression_of_a_macro_that_leads_to_python_is_refused_in_the_macro() -> None:
+def test_a_macro_expression_that_leads_to_python_is_refused_in_the_macro() -> None:
     macro = f'<xacro:macro name="m" params="">\n<link name="${{{LAMBDA}}}"/></xacro:macro>'
     write(macro, file="lib.xacro")
     (finding,) = lint('<xacro:include filename="lib.xacro"/>', "<xacro:m/>")

@@ -156,7 +156,7 @@ def test_a_joint_of_hardware_is_found_in_the_macro() -> None:
     assert (finding.code, place(finding)) == ("TF703", "r.xacro:4:18")
 
 
-def test_a_relative_mesh_begins_at_the_document_and_not_at_what_it_includes() -> None:
+def test_a_relative_mesh_path_starts_at_the_document_not_at_an_include() -> None:
     Path("lib").mkdir()
     mesh = '<link name="a"><visual><geometry><mesh filename="a.stl"/></geometry></visual></link>'
     Path("lib/a.xacro").write_text(

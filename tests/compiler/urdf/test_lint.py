@@ -206,7 +206,7 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
         "package:///mine/meshes/a.stl",
     ],
 )
-def test_what_is_nearly_the_address_of_a_file_in_a_package_gets_the_right_form(
+def test_a_near_miss_of_a_package_address_gets_the_right_form(
     source_text: str,
 ) -> None:
     _, finding = Packages(disk()).asset(source_text, Span("a.urdf"))
@@ -232,9 +232,9 @@ def test_a_package_is_searched_where_ros_searches(
     gone = missing("package://mine/b.stl")
     assert gone
     assert (gone.code, str(tmp_path / "share/mine/b.stl") in gone.help) == ("TF723", True)
-    other = missing("package://other/b.stl")
-    assert other
-    assert (other.code, "/nowhere/share/other" in other.help) == ("TF724", True)
+    finding = missing("package://other/b.stl")
+    assert finding
+    assert (finding.code, "/nowhere/share/other" in finding.help) == ("TF724", True)
     monkeypatch.delenv("AMENT_PREFIX_PATH")
     unset = missing("package://mine/meshes/a.stl")
     assert unset
@@ -435,8 +435,8 @@ def mutated(draw: st.DrawFn) -> str:
     text = draw(st.sampled_from(TEXTS))
     for _ in range(draw(st.integers(1, 5))):
         words = re.split(r"(\s+|\"|=)", text)
-        at = draw(st.integers(0, len(words) - 1))
-        words[at] = draw(st.sampled_from(ODD) | st.sampled_from(words) | st.text(max_size=3))
+        index = draw(st.integers(0, len(words) - 1))
+        words[index] = draw(st.sampled_from(ODD) | st.sampled_from(words) | st.text(max_size=3))
         text = "".join(words)
     return text
 
@@ -469,9 +469,9 @@ def test_the_rules_that_are_named_are_known() -> None:
 def large(links: int, first: str) -> str:
     """Return a URDF of a base and so many links on it, with a comment in the beginning."""
     parts = [
-        f'<link name="l{at}"/><joint name="j{at}" type="fixed"><parent link="b"/><child'
-        f' link="l{at}"/></joint>'
-        for at in range(links)
+        f'<link name="l{index}"/><joint name="j{index}" type="fixed"><parent link="b"/><child'
+        f' link="l{index}"/></joint>'
+        for index in range(links)
     ]
     return (
         f'<!-- {first} --><robot name="r"><link name="b"/>{"".join(parts)}<joint'
@@ -479,9 +479,7 @@ def large(links: int, first: str) -> str:
     )
 
 
-def test_characters_beyond_ascii_cost_no_more_than_others_and_places_are_right_after_them() -> (
-    None
-):
+def test_non_ascii_costs_nothing_extra_and_keeps_later_places_right() -> None:
     seconds = {}
     for first in ("u", "ü"):
         text = large(8000, first)
@@ -493,13 +491,13 @@ def test_characters_beyond_ascii_cost_no_more_than_others_and_places_are_right_a
     assert seconds["ü"] < 3 * seconds["u"]
 
 
-def test_a_urdf_as_large_as_that_of_10_000_frames_is_read_and_a_larger_one_is_refused() -> None:
+def test_a_urdf_of_10_000_frames_is_read_and_a_larger_one_is_refused() -> None:
     text = large(2, "x" * 6_000_000)
     assert "TF008" not in {finding.code for finding in lint_text(text)}
     assert [finding.code for finding in lint_text(large(2, "x" * 16_000_000))] == ["TF008"]
 
 
-def test_a_package_that_is_not_where_it_is_named_is_not_taken_for_a_slip_of_itself() -> None:
+def test_a_package_absent_from_its_path_is_not_its_own_misspelling() -> None:
     named = Packages(named={"arm_description": ("nowhere", Span("r.yaml"))})
     assert "mean" not in words_of(named.not_found("arm_description", None).help)
     assert "mean" in words_of(named.not_found("arm_descriptoin", None).help)
@@ -520,7 +518,7 @@ def test_a_number_that_no_robot_has_is_refused() -> None:
         ' link="a"/>'
     )
     urdf += '<child link="b"/><origin xyz="{} 0 0"/></joint></robot>'
-    found = {
+    codes = {
         size: {
             finding.code
             for finding in robot_of(
@@ -529,4 +527,4 @@ def test_a_number_that_no_robot_has_is_refused() -> None:
         }
         for size in ("1e29", "1e31", "-1e31")
     }
-    assert found == {"1e29": set(), "1e31": {"TF721"}, "-1e31": {"TF721"}}
+    assert codes == {"1e29": set(), "1e31": {"TF721"}, "-1e31": {"TF721"}}

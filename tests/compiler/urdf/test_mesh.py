@@ -65,7 +65,7 @@ def addresses(folder: Path) -> list[str]:
     return full
 
 
-def test_addresses_stay_as_in_the_source_and_relative_ones_lead_from_the_build_folder(
+def test_addresses_stay_and_relative_ones_lead_from_the_build_folder(
     workspace: Path,
 ) -> None:
     assert build(workspace).returncode == 0
@@ -79,14 +79,14 @@ def test_addresses_stay_as_in_the_source_and_relative_ones_lead_from_the_build_f
 
 def test_for_readers_without_ros_every_address_is_a_file_that_is_there(workspace: Path) -> None:
     assert build(workspace, "--mesh", "file").returncode == 0
-    found = addresses(workspace / "build/r")
-    assert all(address.startswith("file:///") for address in found)
-    assert [Path(unquote(address[7:])) for address in found] == [
+    meshes = addresses(workspace / "build/r")
+    assert all(address.startswith("file:///") for address in meshes)
+    assert [Path(unquote(address[7:])) for address in meshes] == [
         workspace.parent / name for name in MESHES
     ]
     assert build(workspace, "--mesh", "relative").returncode == 0
-    found = addresses(workspace / "build/r")
-    assert [(workspace / "build/r" / address).resolve() for address in found] == [
+    meshes = addresses(workspace / "build/r")
+    assert [(workspace / "build/r" / address).resolve() for address in meshes] == [
         workspace.parent / name for name in MESHES
     ]
 
@@ -130,7 +130,7 @@ def test_a_package_that_is_nowhere_is_reported_with_the_folders_searched(workspa
     assert "error[TF724] package://sorced/meshes/s.stl" in requested.stderr
 
 
-def test_a_package_that_is_nowhere_else_is_the_one_around_the_file_that_asks(
+def test_an_otherwise_unknown_package_is_the_one_around_the_asking_file(
     workspace: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A checkout of a vendor's package is read before it is built and sourced.
@@ -214,7 +214,7 @@ def test_a_build_is_the_same_wherever_the_workspace_is(workspace: Path) -> None:
     } == first
 
 
-def test_a_mass_over_a_mesh_is_spread_by_its_triangles_and_trimesh_is_loaded_only_for_that(
+def test_only_the_mass_of_a_mesh_loads_trimesh_and_triangles_spread_it(
     workspace: Path,
 ) -> None:
     names = (
@@ -283,11 +283,11 @@ def test_a_mass_that_cannot_be_spread_is_a_finding(
     """A mesh whose volume is only a sum of its triangles builds nothing, without warnings."""
     robot = workspace / "src/robots/r.yaml"
     robot.write_text(ROBOT + "    inertial: {mass: 6 kg}\n")
-    shown = workspace / "src/robots/meshes/a b.stl"
+    mesh_file = workspace / "src/robots/meshes/a b.stl"
     if isinstance(content, str):
-        shown.write_text(content)
+        mesh_file.write_text(content)
     else:
-        trimesh.Trimesh(*content, process=False).export(shown)
+        trimesh.Trimesh(*content, process=False).export(mesh_file)
     done = build(workspace)
     assert done.returncode == 1
     assert "r.yaml:10:5: error[TF725] meshes/a b.stl: " in done.stderr

@@ -77,7 +77,7 @@ def changed(text: str, joints: set[str]) -> Iterator[tuple[str, str]]:
             for key, value in element.attrib.items():
                 if (top.tag, element, key) == ("joint", top, "name") and value not in joints:
                     continue  # of a frame that is no joint in the robot file
-                element.set(key, other(key, value))
+                element.set(key, changed_value(key, value))
                 yield (
                     ET.tostring(root, "unicode"),
                     f"{top.get('name')}: {element.tag} {key}={value}",
@@ -85,7 +85,7 @@ def changed(text: str, joints: set[str]) -> Iterator[tuple[str, str]]:
                 element.set(key, value)
 
 
-def other(key: str, value: str) -> str:
+def changed_value(key: str, value: str) -> str:
     if key in {"name", "link", "joint", "filename", "type"}:
         return "floating" if value == "planar" else "planar" if key == "type" else f"{value}x"
     first, *rest = value.split()
@@ -208,7 +208,7 @@ def test_a_pose_is_compared_to_the_last_digits_of_its_text(key: str, by: float) 
     text = texts(robot)["robot.urdf"]
     numbers = re.search(f'{key}="([^"]+)"', text[text.index('<joint name="j"') :])
     assert numbers
-    first, *others = numbers[1].split()
-    moved = f'{key}="{float(first) + by} {" ".join(others)}"'
+    first, *rest = numbers[1].split()
+    moved = f'{key}="{float(first) + by} {" ".join(rest)}"'
     assert not list(differences(robot, text, TARGET, full=True))
     assert list(differences(robot, text.replace(numbers[0], moved), TARGET, full=True))

@@ -103,17 +103,17 @@ class Own:
 
         Random, and what follows from it for those that mimic one.
         """
-        found = {
+        values = {
             edge.joint.name: chance.uniform(-2, 2)
             for edge in self.moving
             if edge.joint and not edge.joint.mimic
         }
         for edge in self.moving:
             if edge.joint and edge.joint.mimic:
-                found[edge.joint.name] = (
-                    edge.joint.multiplier * found[edge.joint.mimic] + edge.joint.offset
+                values[edge.joint.name] = (
+                    edge.joint.multiplier * values[edge.joint.mimic] + edge.joint.offset
                 )
-        return found
+        return values
 
     def poses(self, positions: Mapping[str, float]) -> dict[str, Any]:
         masters = {
@@ -125,22 +125,27 @@ class Own:
         fill(state, 1, list(masters.values()))
         answer = self.mover.tf_message(bytes(state), 0)
         moved = decode(answer) if answer else []
-        at = {transform.child: Pose(transform.xyz, transform.quat_xyzw) for transform in moved}
-        found: dict[str, Any] = {}
+        moved_poses = {
+            transform.child: Pose(transform.xyz, transform.quat_xyzw) for transform in moved
+        }
+        matrices: dict[str, Any] = {}
         for frame in self.edges:
             pose, step = Pose(), frame
             while step in self.edges and step != self.base:
-                pose, step = at.get(step, self.edges[step].pose) @ pose, self.edges[step].parent
+                pose, step = (
+                    moved_poses.get(step, self.edges[step].pose) @ pose,
+                    self.edges[step].parent,
+                )
             if step == self.base:
-                found[frame] = matrix(pose)
-        return found
+                matrices[frame] = matrix(pose)
+        return matrices
 
 
 def compare(robot: Robot, reader: Reader, files: Mapping[str, str]) -> None:
-    own, chance = Own(read_plan(files["plan.json"], "plan.json")), random.Random(1)
+    planned, chance = Own(read_plan(files["plan.json"], "plan.json")), random.Random(1)
     for _ in range(POSITIONS):
-        positions = own.positions(chance)
-        mine, theirs = own.poses(positions), reader.poses(positions)
+        positions = planned.positions(chance)
+        mine, theirs = planned.poses(positions), reader.poses(positions)
         assert set(theirs) >= set(mine) - {robot.base}
         for frame, pose in mine.items():
             if frame != robot.base:
@@ -149,30 +154,30 @@ def compare(robot: Robot, reader: Reader, files: Mapping[str, str]) -> None:
 
 def bodies_of(robot: Robot) -> dict[str, Body]:
     """Return the bodies as tfcompose has them."""
-    found = {}
+    bodies = {}
     for name, link in robot.links.items():
         if link.inertial:
             xx, xy, xz, yy, yz, zz = link.inertial.tensor
             tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            found[name] = Body(link.inertial.mass, np.zeros(3), tensor).moved(
+            bodies[name] = Body(link.inertial.mass, np.zeros(3), tensor).moved(
                 matrix(link.inertial.pose)
             )
-    return found
+    return bodies
 
 
 def fixed_to(robot: Robot, link: str) -> Body:
     """Return what is fixed to the link, itself included, as one body."""
-    own = bodies_of(robot)
-    found, waiting = [], [(link, np.eye(4))]
+    bodies = bodies_of(robot)
+    fixed, waiting = [], [(link, np.eye(4))]
     while waiting:
         name, pose = waiting.pop()
-        found += [own[name].moved(pose)] if name in own else []
+        fixed += [bodies[name].moved(pose)] if name in bodies else []
         waiting += [
             (e.child, pose @ matrix(e.pose))
             for e in robot.edges
             if e.parent == name and e.kind == "static"
         ]
-    return together(found)
+    return together(fixed)
 
 
 def assert_equal(theirs: Body, mine: Body, link: str) -> None:

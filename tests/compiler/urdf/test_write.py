@@ -75,7 +75,7 @@ def assert_close(mine: Pose, theirs: Any) -> None:
 
 
 @pytest.mark.parametrize(("name", "profiles"), CASES)
-def test_yourdfpy_finds_every_frame_below_base_where_tfcompose_has_it_at_any_wheel_angle(
+def test_yourdfpy_agrees_on_every_frame_below_base_at_any_wheel_angle(
     name: str, profiles: tuple[str, ...]
 ) -> None:
     robot = example(name, profiles)
@@ -95,7 +95,7 @@ def test_yourdfpy_finds_every_frame_below_base_where_tfcompose_has_it_at_any_whe
 
 
 @pytest.mark.parametrize(("name", "profiles"), CASES)
-def test_edges_float_in_robot_urdf_exactly_where_somebody_else_publishes_them(
+def test_edges_float_in_robot_urdf_exactly_if_another_node_publishes_them(
     name: str, profiles: tuple[str, ...]
 ) -> None:
     robot = example(name, profiles)
@@ -121,9 +121,7 @@ processes: {gimbal: {external: true}}
 """
 
 
-def test_a_sensor_is_one_body_though_its_driver_sends_its_lenses_on_tf_and_a_gimbal_moves_it() -> (
-    None
-):
+def test_a_sensor_with_lenses_on_tf_is_one_body_that_a_gimbal_moves() -> None:
     robot = robot_of(HEAD + GIMBAL)
     assert {
         edge.child for edge in robot.edges if edge.kind == "dynamic" and edge.owner == "eye"
@@ -167,9 +165,11 @@ AUTONOMOUS_ROBOT = {
 def test_a_frame_of_the_tutorial_is_where_the_tutorial_has_it(
     name: str, frame: str, xyz: tuple[float, ...], rpy: tuple[float, ...]
 ) -> None:
-    found = read_back(urdf(example(name))[0]).get_transform(frame, "base_link")
-    assert tuple(found[:3, 3]) == pytest.approx(xyz, abs=1e-9)
-    assert found[:3, :3] == pytest.approx(Rotation.from_euler("xyz", rpy).as_matrix(), abs=1e-9)
+    transform = read_back(urdf(example(name))[0]).get_transform(frame, "base_link")
+    assert tuple(transform[:3, 3]) == pytest.approx(xyz, abs=1e-9)
+    assert transform[:3, :3] == pytest.approx(
+        Rotation.from_euler("xyz", rpy).as_matrix(), abs=1e-9
+    )
 
 
 def test_the_bodies_are_those_of_the_tutorial() -> None:
@@ -180,39 +180,39 @@ def test_the_bodies_are_those_of_the_tutorial() -> None:
         mine["laser_link"].visuals[0].geometry.cylinder.radius,
         mine["laser_link"].visuals[0].geometry.cylinder.length,
     ) == (0.05, 0.05)
-    other = read_back(urdf(example("autonomous_robot"))[0]).link_map
-    assert tuple(other["base_link"].visuals[0].geometry.box.size) == (0.5, 0.4, 0.15)
-    assert other["base_link"].inertial.mass == 10
+    links = read_back(urdf(example("autonomous_robot"))[0]).link_map
+    assert tuple(links["base_link"].visuals[0].geometry.box.size) == (0.5, 0.4, 0.15)
+    assert links["base_link"].inertial.mass == 10
     # A solid box: m/12 (b² + c²). The tutorial's 0.1 on every axis belongs to no box of this size.
     expected = [
         10 / 12 * (0.4**2 + 0.15**2),
         10 / 12 * (0.5**2 + 0.15**2),
         10 / 12 * (0.5**2 + 0.4**2),
     ]
-    assert list(other["base_link"].inertial.inertia.diagonal()) == pytest.approx(expected)
+    assert list(links["base_link"].inertial.inertia.diagonal()) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("frame", ["camera_depth_optical_frame", "camera_color_optical_frame"])
 def test_the_camera_points_15_degrees_down_and_its_images_are_upright(frame: str) -> None:
-    found = read_back(urdf(example("autonomous_robot"))[0]).get_transform(frame, "base_link")[
+    rotation = read_back(urdf(example("autonomous_robot"))[0]).get_transform(frame, "base_link")[
         :3, :3
     ]
     down = math.radians(15)
-    right, image_down, forward = found[:, 0], found[:, 1], found[:, 2]
+    right, image_down, forward = rotation[:, 0], rotation[:, 1], rotation[:, 2]
     assert forward == pytest.approx((math.cos(down), 0, -math.sin(down)), abs=1e-9)
     assert right == pytest.approx((0, -1, 0), abs=1e-9)
     assert image_down == pytest.approx((-math.sin(down), 0, -math.cos(down)), abs=1e-9)
 
 
 def test_the_cameras_screw_is_where_the_vendors_own_numbers_put_it() -> None:
-    found = read_back(urdf(example("autonomous_robot"))[0]).get_transform(
+    transform = read_back(urdf(example("autonomous_robot"))[0]).get_transform(
         "camera_link", "camera_bottom_screw_frame"
     )
-    assert tuple(found[:3, 3]) == pytest.approx((0.0106, 0.0175, 0.0125), abs=1e-9)
+    assert tuple(transform[:3, 3]) == pytest.approx((0.0106, 0.0175, 0.0125), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["a & b", 'say "hi"', "it's", "<x>", "a\nb"])
-def test_a_name_that_xml_takes_differently_never_reaches_a_file_and_would_be_escaped(
+def test_a_name_unsafe_in_xml_reaches_no_file_and_would_be_escaped(
     name: str,
 ) -> None:
     text = HEAD + f"links: {{base_link: {{}}, {json.dumps(name)}: {{parent: base_link}}}}\n"
@@ -223,7 +223,7 @@ def test_a_name_that_xml_takes_differently_never_reaches_a_file_and_would_be_esc
     assert [link.get("name") for link in read.iter("link")] == ["base_link", name]
 
 
-def test_no_two_joints_have_one_name_even_where_the_user_took_the_generated_one() -> None:
+def test_no_two_joints_share_a_name_even_if_the_user_took_a_generated_one() -> None:
     text = (
         HEAD + "links: {base_link: {}, w: {}, v: {parent: base_link}}\n"
         "joints: {base_link_to_v: {type: continuous, parent: base_link, child: w}}\n"

@@ -68,7 +68,7 @@ def test_by_its_defaults_it_is_the_robot(text: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", robots())
-def test_twice_in_somebody_elses_xacro_it_is_two_robots_where_they_were_put(
+def test_a_foreign_xacro_included_twice_gives_two_robots_in_their_places(
     text: str, tmp_path: Path
 ) -> None:
     files = files_of(text, tmp_path)
@@ -81,14 +81,14 @@ def test_twice_in_somebody_elses_xacro_it_is_two_robots_where_they_were_put(
         <xacro:{name} prefix="left_" parent="table" xyz="0 ${{away}} 0" rpy="0 0 ${{pi / 2}}" {meshes}/>
         <xacro:{name} prefix="right_" parent="left_{base_of(files)}"/>
         </robot>""")  # noqa: E501 (a text as its reader has it)
-    found, single = expanded(outer), ET.fromstring(files["robot.urdf"])  # noqa: S314 (as above)
+    outer_urdf, single = expanded(outer), ET.fromstring(files["robot.urdf"])  # noqa: S314 (as above)
     links = [str(link.get("name")) for link in single.iter("link") if link.get("name")]
-    assert [link.get("name") for link in found.findall("link")] == [
+    assert [link.get("name") for link in outer_urdf.findall("link")] == [
         "table",
         *(f"{side}_{link}" for side in ("left", "right") for link in links),
     ]
-    joints = {joint.get("name"): joint for joint in found.findall("joint")}
-    assert len(joints) == len(found.findall("joint")) == 2 * len(single.findall("joint")) + 2
+    joints = {joint.get("name"): joint for joint in outer_urdf.findall("joint")}
+    assert len(joints) == len(outer_urdf.findall("joint")) == 2 * len(single.findall("joint")) + 2
     (first,) = (
         joint for joint in joints.values() if joint.find("parent[@link='table']") is not None
     )
@@ -101,7 +101,7 @@ def test_twice_in_somebody_elses_xacro_it_is_two_robots_where_they_were_put(
     )
     for joint in joints.values():
         ends = {str(end.get("link")) for tag in ("parent", "child") for end in joint.findall(tag)}
-        assert ends <= {link.get("name") for link in found.findall("link")}
+        assert ends <= {link.get("name") for link in outer_urdf.findall("link")}
         mimic = joint.find("mimic")
         assert mimic is None or mimic.get("joint") in joints
 
@@ -112,8 +112,8 @@ def base_of(files: Mapping[str, str]) -> str:
 
 def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: Path) -> None:
     files_of(EVERYTHING, tmp_path)
-    found = expanded(tmp_path / "robot.urdf.xacro", {"prefix": "left_"})
-    (control,) = found.findall("ros2_control")
+    urdf = expanded(tmp_path / "robot.urdf.xacro", {"prefix": "left_"})
+    (control,) = urdf.findall("ros2_control")
     names = [
         element.get("name")
         for element in (control, *control.findall("joint"), *control.findall("gpio"))
@@ -125,22 +125,22 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
         "joint",
         "left_joint",
     ]
-    (gazebo,) = found.findall("gazebo")
+    (gazebo,) = urdf.findall("gazebo")
     assert gazebo.get("reference") == "left_hand"
     assert [
         str(gazebo.findtext(f"plugin/{tag}")).strip() for tag in ("frame", "joint", "text", "cost")
     ] == ["left_base_link", "left_joint", "base_link of joint $(eval 1)", "$5 $$(x)"]
-    (drive,) = found.findall("transmission")
+    (drive,) = urdf.findall("transmission")
     assert [element.get("name") for element in drive.iter()] == [
         "left_drive",
         "left_joint",
         "left_motor",
     ]
-    assert [mesh.get("filename") for mesh in found.iter("mesh")] == [
+    assert [mesh.get("filename") for mesh in urdf.iter("mesh")] == [
         "meshes/a.stl",
         "package://x/$(y)/$$(z).stl",
     ]
-    assert [element.get("name") for element in found.iter("material")] == [
+    assert [element.get("name") for element in urdf.iter("material")] == [
         "left_paint"
     ]  # another robot has another paint
 

@@ -105,7 +105,7 @@ def test_a_node_is_named_with_its_process_and_the_owner_is_not(
 
 
 @of_each("strict")
-def test_a_program_of_another_dds_is_named_as_what_it_is_and_no_node_is_accused(
+def test_a_program_of_another_dds_is_named_as_such_and_no_node_is_accused(
     robot: Robot, rogue: Callable[..., subprocess.Popen[str]]
 ) -> None:
     pytest.importorskip("cyclonedds")
@@ -143,7 +143,7 @@ def test_who_joins_the_fence_on_purpose_is_held_back(robot: Robot) -> None:
 
 
 @of_each("strict")
-def test_a_flood_of_ever_new_frames_is_named_and_takes_neither_the_tree_nor_the_memory(
+def test_a_flood_of_new_frames_is_named_and_harms_neither_tree_nor_memory(
     robot: Robot, rogue: Callable[..., subprocess.Popen[str]]
 ) -> None:
     guard = psutil.Process(robot.pid_of("guard"))

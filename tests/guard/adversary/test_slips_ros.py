@@ -89,7 +89,7 @@ def stopped(robot: Robot, name: str) -> bool:
 
 
 @pytest.mark.parametrize("name", ["own_profile", "no_profile", "plain"])
-def test_who_leaves_the_fence_is_stopped_and_who_sends_what_nobody_declared_is_named(
+def test_leaving_the_fence_stops_a_process_and_undeclared_edges_are_named(
     robot: Robot, name: str
 ) -> None:
     if robot.guard == "remap" or name != "plain":
@@ -128,7 +128,7 @@ def test_a_child_that_left_its_session_is_named_by_its_own_process(robot: Robot)
     assert FORKED_X not in PlainListener().until("base_link", 0.0, 40)
 
 
-def test_a_child_of_another_dds_is_named_as_what_it_is_and_listeners_get_it(robot: Robot) -> None:
+def test_a_child_of_another_dds_is_named_as_such_and_listeners_get_it(robot: Robot) -> None:
     robot.says("TF803", "odom → foreign", "a DDS program that is not a ROS node")
     PlainListener().until("foreign", PLAIN_X)
     robot.says("cannot be held back")

@@ -408,8 +408,8 @@ def test_stamps_that_are_the_age_of_this_machine_are_named() -> None:
     boot_ns = time.time_ns() - time.clock_gettime_ns(time.CLOCK_BOOTTIME)
     now_ns = time.time_ns()
     named = other_clock(now_ns - boot_ns, now_ns, None, simulated=False)
-    other = other_clock(now_ns - boot_ns + 100 * SECOND_NS, now_ns, None, simulated=False)
-    assert ("this machine" in named, "this machine" in other) == (True, False)
+    unnamed = other_clock(now_ns - boot_ns + 100 * SECOND_NS, now_ns, None, simulated=False)
+    assert ("this machine" in named, "this machine" in unnamed) == (True, False)
 
 
 def test_the_cost_of_tf_names_who_sends_edges_one_by_one() -> None:
@@ -421,19 +421,19 @@ def test_the_cost_of_tf_names_who_sends_edges_one_by_one() -> None:
     assert all(word in cost for word in ("/tf", "2 listeners", "3 edges one by one"))
 
 
-def test_where_some_are_dropped_it_is_not_reported_that_the_frame_is_missing() -> None:
+def test_a_frame_with_dropped_messages_is_not_reported_missing() -> None:
     always = only(sound_tree().takes(row("base_link arm", END_NS, float("nan")), b"x").observed())
     some = only(sound_tree().takes(row("odom base_link", END_NS, float("nan"))).observed())
     assert always.code == some.code == "TF831"
     assert always.help != some.help
 
 
-@pytest.mark.parametrize(("w", "found"), [(0.9, {"TF831"}), (0.0, {"TF830", "TF831"})])
+@pytest.mark.parametrize(("w", "expected"), [(0.9, {"TF831"}), (0.0, {"TF830", "TF831"})])
 def test_a_frame_whose_quaternion_tf2_normalises_belongs_to_the_tree(
-    w: float, found: set[str]
+    w: float, expected: set[str]
 ) -> None:
     history = sound_tree().takes(row("base_link arm", END_NS, w=w), b"x").fixed("arm hand")
-    assert codes(history.observed()) == found
+    assert codes(history.observed()) == expected
 
 
 def test_edges_of_a_publisher_that_replaced_another_have_one_publisher() -> None:
@@ -461,9 +461,7 @@ def test_what_a_strict_guard_passes_on_is_its_owners() -> None:
     assert codes(history.observed(plan=sound_plan())) == {"TF801"}
 
 
-def test_processes_with_other_settings_are_searched_where_there_is_no_tf_below_a_namespace() -> (
-    None
-):
+def test_without_tf_in_a_namespace_other_process_settings_are_searched() -> None:
     observed = TreeState(SECONDS, processes=(RosProcess(9, "nav", {"ROS_DOMAIN_ID": "8"}),))
     assert codes(observed) == {"TF845", "TF908"}
     below = (TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),)
@@ -476,12 +474,12 @@ def test_of_many_other_settings_some_are_named_and_some_processes_of_each() -> N
         RosProcess(pid, "nav", {"ROS_DOMAIN_ID": str(domain)})
         for pid, domain in enumerate(domains, 100)
     )
-    found = [
+    findings = [
         finding
         for finding in diagnose(TreeState(SECONDS, processes=started))
         if finding.code == "TF908"
     ]
-    assert len(found) == MOST_SETTINGS == 3
+    assert len(findings) == MOST_SETTINGS == 3
     many = diagnose(TreeState(SECONDS, processes=started[: MOST_PROCESSES + 2]))
     [of_one] = [finding for finding in many if finding.code == "TF908"]
     assert len(of_one.notes) == MOST_PROCESSES + 1
@@ -500,9 +498,11 @@ def test_processes_with_other_settings_cannot_be_heard_and_why_is_reported() -> 
         "the default may be the same"
     )
     observed = TreeState(1.0, settings={**ours, "RMW_IMPLEMENTATION": "b"})
-    other = RosProcess(9, "nav", {**ours, "ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"})
+    process = RosProcess(9, "nav", {**ours, "ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"})
     [finding] = [
-        entry for entry in diagnose(replace(observed, processes=(other,))) if entry.code == "TF908"
+        entry
+        for entry in diagnose(replace(observed, processes=(process,)))
+        if entry.code == "TF908"
     ]
     names = (
         "ROS_DOMAIN_ID=8",

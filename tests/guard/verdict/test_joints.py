@@ -69,7 +69,7 @@ def test_a_joint_that_the_robot_lacks_is_named_with_the_nearest() -> None:
     assert not list(unknown_joints([sender("/rogue", "anything")], set()))
 
 
-def test_a_joint_that_follows_another_needs_no_state_also_where_the_plan_describes_it() -> None:
+def test_a_mimic_joint_needs_no_state_even_if_the_plan_describes_it() -> None:
     joint = PlanJoint("arm", "revolute", (0.0, 0.0, 1.0))
     edge = PlanEdge(
         "base_link",
@@ -95,7 +95,7 @@ def test_doctor_judges_the_topic_of_this_robot_alone() -> None:
     joints = (MovingJoint("arm", "base_link", "arm_link"),)
     senders = (sender("/wheels", "arm"), sender("/rogue", "arm"))
     heard = TopicState(TOPIC, "sensor_msgs/msg/JointState", ("/wheels", "/rogue"), ("/drive",))
-    other = TopicState("/else/states", heard.type, heard.publishers, heard.readers)
-    for topic, expected in ((heard, True), (other, False)):
+    foreign_topic = TopicState("/else/states", heard.type, heard.publishers, heard.readers)
+    for topic, expected in ((heard, True), (foreign_topic, False)):
         state = sound_tree().observed(graph=(topic,), moving_joints=joints, sent_joints=senders)
         assert ("TF860" in {finding.code for finding in diagnose(state)}) is expected

@@ -157,17 +157,17 @@ def test_a_driver_that_was_started_again_is_compared_again() -> None:
     assert len(guard.says()) == 1
 
 
-def test_a_sender_without_a_name_is_waited_for_and_a_stranger_is_not_compared() -> None:
+def test_a_sender_without_a_name_is_awaited_and_a_stranger_not_compared() -> None:
     """Whoever else sends the edge is told that it is not theirs."""
     guard = Guard()
     guard.hears(("link", "lens", moved(LENS, 0.1)))
     assert guard.says() == []
     guard.knows("/front/front")
     assert len(guard.says()) == 1
-    other = Guard()
-    other.knows("/stranger")
-    other.hears(("link", "lens", moved(LENS, 0.1)))
-    assert other.says() == []
+    second_guard = Guard()
+    second_guard.knows("/stranger")
+    second_guard.hears(("link", "lens", moved(LENS, 0.1)))
+    assert second_guard.says() == []
 
 
 @pytest.mark.parametrize(

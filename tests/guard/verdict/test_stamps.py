@@ -34,5 +34,5 @@ def test_a_stamp_is_compared_with_the_clock_that_it_should_be_of(
     assert [value for value in values if value not in output] == []
 
 
-def test_where_nobody_knows_when_it_came_nothing_is_reported_of_the_systems_time() -> None:
+def test_without_arrival_times_the_system_time_is_not_reported() -> None:
     assert other_clock(NOW, 0, None, simulated=False) == ""

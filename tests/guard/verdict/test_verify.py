@@ -107,14 +107,14 @@ class Tree:
         static = more.get("static", not rate)
         times = [0.0] if not rate else [i / rate for i in range(round(10 * rate))]
         gid = more.get("gid", node.encode())
-        for at in times:
+        for time_s in times:
             if (
-                not more.get("until", 11) > at
-                or more.get("gap", (11, 11))[0] < at < more.get("gap", (11, 11))[1]
+                not more.get("until", 11) > time_s
+                or more.get("gap", (11, 11))[0] < time_s < more.get("gap", (11, 11))[1]
             ):
                 continue
-            received = 100 * S + round(at * S)
-            stamp = 100 * S + round((at * more.get("speed", 1.0) + more.get("ahead", 0.0)) * S)
+            received = 100 * S + round(time_s * S)
+            stamp = 100 * S + round((time_s * more.get("speed", 1.0) + more.get("ahead", 0.0)) * S)
             stamp = more.get("stamp", stamp)
             row = (parent, child, *divmod(stamp, S), *pose.xyz, *pose.quat_xyzw)
             self.observer.take([row], static=static, gid=gid, received_ns=received)
@@ -340,11 +340,11 @@ def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -
     tree.send("base", "odom", DRIVE, rate=10.0, gid=b"twin")
     for child, words in tree.sent.items():
         tree.send(child, **words)
-    known = [
+    publishers = [
         Publisher(words["node"].encode(), words["node"], static=False)
         for words in tree.sent.values()
     ]
-    tree.observer.take_graph([*known, Publisher(b"twin", DRIVE, static=False)])
+    tree.observer.take_graph([*publishers, Publisher(b"twin", DRIVE, static=False)])
     [finding] = [
         entry
         for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE)
@@ -365,11 +365,11 @@ def test_of_three_nodes_of_the_owners_name_two_are_named_with_one_edge(
         Publisher(gid, DRIVE, static=False, where=f"{where} {number}")
         for number, gid in enumerate((DRIVE.encode(), b"twin1", b"twin2"), 10)
     ]
-    others = [
+    publishers = [
         Publisher(options["node"].encode(), options["node"], static=False)
         for options in tree.sent.values()
     ]
-    tree.observer.take_graph([*others, *present])
+    tree.observer.take_graph([*publishers, *present])
     state = state_of(tree.observer, TOPICS)
     twice = [each for each in differences(state, plan) if each.code == "TF801"]
     [group] = group_differences(twice)
@@ -405,9 +405,7 @@ def test_a_namesake_that_left_last_does_not_make_the_owner_leave(plan: Plan, tre
     assert tree.reported(plan) == []
 
 
-def test_where_a_simulation_goes_slower_than_the_time_of_day_edges_may_come_as_much_more_rarely(
-    plan: Plan, tree: Tree
-) -> None:
+def test_a_slow_simulation_allows_proportionally_rarer_edges(plan: Plan, tree: Tree) -> None:
     tree.sent["base"] |= {"rate": 2.0, "speed": 0.2}
     tree.sent["wheel"] |= {"rate": 2.0, "speed": 0.2}
     assert tree.reported(replace(plan, ros=RosSettings(clock="sim"))) == []
@@ -428,7 +426,7 @@ def test_a_planned_frame_that_is_published_in_itself_is_missing(plan: Plan, tree
     assert [finding.code for finding in tree.reported(plan)] == ["TF821", "TF811"]
 
 
-def test_a_publisher_that_stays_without_a_name_is_blamed_and_one_that_has_just_come_is_not(
+def test_a_lasting_unnamed_publisher_is_blamed_and_a_new_one_is_not(
     plan: Plan, tree: Tree
 ) -> None:
     tree.send("laser", "base", "", LASER, gid=b"raw")
@@ -465,7 +463,7 @@ def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan:
     assert [finding.code for verdict in verdicts for finding in verdict.findings] == []
 
 
-def test_a_driver_far_from_its_preset_is_reported_and_strangers_are_not_compared(
+def test_a_driver_far_from_its_preset_is_reported_and_no_stranger_compared(
     plan: Plan, tree: Tree
 ) -> None:
     driven = replace(plan.process("camera").drives[0], frames={"lens": "nominal"})
@@ -483,15 +481,13 @@ def test_a_driver_far_from_its_preset_is_reported_and_strangers_are_not_compared
     assert [entry.code for entry in tree.reported(plan)] == ["TF801"]
 
 
-def test_of_a_recording_nothing_is_advised_that_only_a_running_robot_can_do(
-    plan: Plan, tree: Tree
-) -> None:
+def test_advice_for_a_recording_needs_no_running_robot(plan: Plan, tree: Tree) -> None:
     del tree.sent["laser"]
     tree.sent["base"]["until"] = 5.0
     for words in tree.sent.values():
         words["gid"] = None
-    found = {finding.code: finding.help for finding in tree.reported(plan, graph=False)}
-    assert found == {"TF804": "", "TF811": ""}
+    advice_by_code = {finding.code: finding.help for finding in tree.reported(plan, graph=False)}
+    assert advice_by_code == {"TF804": "", "TF811": ""}
 
 
 def test_a_bag_knows_no_publishers_and_blames_none(plan: Plan, tree: Tree) -> None:

@@ -144,7 +144,7 @@ def test_swept_joints_begin_where_they_stand_and_the_others_stay(
 
 
 @pytest.mark.parametrize("senders", [["/drive"], []])
-def test_joints_that_no_joint_state_speaks_of_are_named_once_after_5_s_with_who_sends_the_others(
+def test_joints_without_states_are_named_once_after_5_s_with_other_senders(
     edge: Callable[..., PlanEdge],
     write: Callable[..., Path],
     monkeypatch: pytest.MonkeyPatch,

@@ -76,8 +76,8 @@ def slide(name: str, *mimic: object) -> PlanEdge:
     return joint_edge(PlanJoint(name, "prismatic", Z, *mimic))  # type: ignore[arg-type]
 
 
-def heights(found: dict[str, SentTransform]) -> dict[str, float]:
-    return {name: transform.xyz[2] for name, transform in found.items()}
+def heights(transforms: dict[str, SentTransform]) -> dict[str, float]:
+    return {name: transform.xyz[2] for name, transform in transforms.items()}
 
 
 @given(
@@ -87,8 +87,8 @@ def heights(found: dict[str, SentTransform]) -> dict[str, float]:
     numbers,
     st.sampled_from(["revolute", "prismatic"]),
 )
-def test_a_joint_rotates_about_its_axis_or_slides_along_it_after_its_edges_pose(
-    at: tuple[float, float, float, float],
+def test_a_joint_rotates_about_or_slides_along_its_axis_after_its_pose(
+    quat_xyzw: tuple[float, float, float, float],
     towards: tuple[float, float, float, float],
     xyz: tuple[float, float, float],
     q: float,
@@ -97,8 +97,8 @@ def test_a_joint_rotates_about_its_axis_or_slides_along_it_after_its_edges_pose(
     turning = kind == "revolute"
     axis = tuple(Rotation.from_quat(towards).apply([0, 0, 1]))
     joint = PlanJoint("j", kind, axis)
-    moved = Robot([joint_edge(joint, Pose(xyz, at))]).hear({"j": q})["j"]
-    before = Rotation.from_quat(at)
+    moved = Robot([joint_edge(joint, Pose(xyz, quat_xyzw))]).hear({"j": q})["j"]
+    before = Rotation.from_quat(quat_xyzw)
     rotation = before * Rotation.from_rotvec([q * a for a in axis]) if turning else before
     position = (
         xyz
@@ -113,7 +113,7 @@ def test_a_joint_rotates_about_its_axis_or_slides_along_it_after_its_edges_pose(
 @given(
     st.lists(st.sampled_from(["revolute", "continuous", "prismatic"]), max_size=12), st.randoms()
 )
-def test_all_joints_move_as_each_alone_does_whatever_the_order_of_the_names(
+def test_all_joints_move_as_each_does_alone_in_any_order_of_names(
     kinds: list[JointType], random: Random
 ) -> None:
     edges = [
@@ -123,8 +123,8 @@ def test_all_joints_move_as_each_alone_does_whatever_the_order_of_the_names(
     names = [f"j{n}" for n in range(len(kinds))]
     random.shuffle(names)
     positions = {name: 0.1 * int(name[1:]) - 0.3 for name in names}
-    found = Robot(edges).hear(positions)
-    assert found == {name: Robot(edges).hear({name: positions[name]})[name] for name in names}
+    transforms = Robot(edges).hear(positions)
+    assert transforms == {name: Robot(edges).hear({name: positions[name]})[name] for name in names}
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
@@ -134,29 +134,29 @@ def test_a_chain_of_mimics_is_followed_in_any_order(order: tuple[int, ...]) -> N
         slide("a_last", "z_middle", -3.0, 0.5),
         slide("master"),
     ]
-    found = Robot([edges[index] for index in order]).hear({"master": 10.0})
-    assert heights(found) == {"z_middle": 21.0, "a_last": -62.5, "master": 10.0}
+    transforms = Robot([edges[index] for index in order]).hear({"master": 10.0})
+    assert heights(transforms) == {"z_middle": 21.0, "a_last": -62.5, "master": 10.0}
 
 
 def test_a_position_that_is_sent_for_a_mimic_wins() -> None:
-    found = Robot([slide("mimic", "master", 2.0), slide("next", "mimic", 1.0, 1.0)]).hear(
+    transforms = Robot([slide("mimic", "master", 2.0), slide("next", "mimic", 1.0, 1.0)]).hear(
         {"master": 10.0, "mimic": 3.0}
     )
-    assert heights(found) == {"mimic": 3.0, "next": 4.0}
+    assert heights(transforms) == {"mimic": 3.0, "next": 4.0}
 
 
 def test_mimics_of_each_other_have_no_position() -> None:
     assert Robot([slide("a", "b"), slide("b", "a"), slide("c", "a")]).hear({"other": 1.0}) == {}
 
 
-def test_a_message_moves_the_joints_that_it_speaks_of_and_no_old_value_is_repeated() -> None:
+def test_a_message_moves_only_its_joints_and_repeats_no_old_value() -> None:
     robot = Robot([slide("left"), slide("right")])
     assert heights(robot.hear({"left": 1.0}, 10)) == {"left": 1.0}
     assert heights(robot.hear({"right": 2.0}, 11)) == {"right": 2.0}
     assert heights(robot.hear({"left": 3.0}, 12)) == {"left": 3.0}
 
 
-def test_joints_that_the_plan_does_not_have_are_left_out_whatever_their_position() -> None:
+def test_joints_outside_the_plan_are_left_out_at_any_position() -> None:
     assert heights(Robot([slide("left")]).hear({"grip": math.nan, "left": 1.0})) == {"left": 1.0}
     assert Robot([slide("left")]).hear({"grip": 1.0}) == {}
 
@@ -168,7 +168,7 @@ def test_of_a_name_that_comes_twice_the_first_counts() -> None:
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
-def test_a_joint_without_a_single_position_is_never_published_and_reported_once(
+def test_a_joint_without_a_single_position_is_reported_once_and_not_sent(
     kind: JointType,
 ) -> None:
     robot = Robot(
@@ -185,7 +185,7 @@ def test_a_joint_without_a_single_position_is_never_published_and_reported_once(
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_a_position_that_is_not_finite_drops_the_message_with_one_line_that_names_the_joint(
+def test_a_non_finite_position_drops_the_message_and_names_the_joint_once(
     bad: float,
 ) -> None:
     robot = Robot([slide("left"), slide("right")])
@@ -207,7 +207,7 @@ def test_messages_that_are_none_are_dropped_with_one_line_for_each_fault() -> No
     assert "positions" in words_of(robot.reports[1])
 
 
-def test_a_source_that_never_repeats_its_names_fills_neither_the_memory_nor_the_output() -> None:
+def test_a_source_of_ever_new_names_fills_neither_memory_nor_output() -> None:
     robot = Robot([slide("left"), slide("right")])
     for stamp in range(300):
         assert heights(
@@ -220,7 +220,7 @@ def test_a_source_that_never_repeats_its_names_fills_neither_the_memory_nor_the_
     assert len(robot.reports) == 1
 
 
-def test_all_transforms_have_the_messages_time_and_one_without_gets_that_of_its_arrival() -> None:
+def test_transforms_take_the_messages_time_or_else_that_of_its_arrival() -> None:
     robot = Robot([slide("left"), slide("right")])
     assert {
         t.stamp_ns for t in robot.hear({"left": 1.0, "right": 1.0}, 12 * SECOND_NS + 34).values()
@@ -265,7 +265,7 @@ def test_a_time_that_no_transform_can_hold_is_dropped() -> None:
 )
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=25)
-def test_publish_frequency_gives_that_frequency_and_says_when_it_leaves_something_out(
+def test_publish_frequency_sets_the_rate_and_reports_omitted_messages(
     source: int, most: int, seed: int
 ) -> None:
     jitter = Random(seed)
@@ -289,7 +289,7 @@ def test_ignore_timestamp_publishes_whatever_the_time_is() -> None:
     assert robot.reports == []
 
 
-def test_joints_that_nobody_spoke_of_are_missing_and_not_those_that_follow_them() -> None:
+def test_joints_without_states_are_missing_but_their_mimics_are_not() -> None:
     robot = Robot(
         [slide("left"), slide("right"), slide("finger", "right"), slide("thumb", "elsewhere")]
     )

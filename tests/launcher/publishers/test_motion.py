@@ -34,10 +34,10 @@ ranges = st.tuples(st.floats(-3, 3), st.floats(0.01, 3)).map(
 
 @given(ranges, st.floats(0, 1), st.floats(0.5, 20))
 def test_a_sweep_reaches_both_ends_and_no_further_from_where_it_begins(
-    ends: tuple[float, float], at: float, period_s: float
+    ends: tuple[float, float], fraction: float, period_s: float
 ) -> None:
     lower, upper = ends
-    start = lower + at * (upper - lower)
+    start = lower + fraction * (upper - lower)
     sweep = Sweep(period_s, lower, upper)
     places = [swept(sweep, start, period_s * n / 1000) for n in range(1001)]
     assert places[0] == pytest.approx(start, abs=1e-6)
@@ -57,7 +57,7 @@ def test_a_sweep_between_two_places_that_are_one_stays() -> None:
     assert swept(Sweep(1.0, 0.2, 0.2), 0.0, 0.3) == 0.2
 
 
-def test_what_mimics_a_simulated_joint_follows_it_through_a_chain_in_any_order() -> None:
+def test_mimics_follow_a_simulated_joint_through_a_chain_in_any_order() -> None:
     axis = (0.0, 0.0, 1.0)
     joints = [
         PlanJoint("a_last", "prismatic", axis, "m_mid", 2.0, 0.1),

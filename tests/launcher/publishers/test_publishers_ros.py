@@ -66,7 +66,7 @@ def rover(edge: Make, write: Make) -> Any:
     return write(moving, PlanProcess("joints", "joints"))
 
 
-def test_a_late_joiner_gets_all_fixed_edges_in_one_message_from_the_node_of_the_plan(
+def test_a_late_joiner_gets_all_fixed_edges_in_one_message_from_the_node(
     start: Make, node: Any, edge: Make, write: Make
 ) -> None:
     """Its command line renames it, and the plan moves its topic into its namespace."""
@@ -92,7 +92,7 @@ def test_a_late_joiner_gets_all_fixed_edges_in_one_message_from_the_node_of_the_
     assert (writer.durability, writer.type) == ("transient_local", "tf2_msgs/msg/TFMessage")
 
 
-def test_joint_states_move_the_wheels_and_what_mimics_them_and_joints_alone_describe_the_robot(
+def test_joint_states_move_wheels_and_mimics_and_only_joints_describes(
     start: Make, node: Any, rover: Any
 ) -> None:
     process = start("joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=10.0")
@@ -100,7 +100,7 @@ def test_joint_states_move_the_wheels_and_what_mimics_them_and_joints_alone_desc
     assert described(node) == "<robot name='rover'/>"
     message = JointState(name=["left", "gripper", "right"], position=[0.7, math.nan, -1.2])
     message.header.stamp.sec, message.header.stamp.nanosec = 12, 34
-    found = _answer(node, message)
+    transforms = _answer(node, message)
 
     axle = Rotation.from_euler("xyz", [0.3, 0, 0])
     turned = {
@@ -110,10 +110,10 @@ def test_joint_states_move_the_wheels_and_what_mimics_them_and_joints_alone_desc
     }
     for name, (before, angle) in turned.items():
         expected = (before * Rotation.from_rotvec([0, angle, 0])).as_quat()
-        assert angle_between(found[name].quat_xyzw, tuple(expected)) < 1e-7
-    assert found["left"].xyz == (0.1, 0.2, 0.0)
-    assert found["finger"].xyz == pytest.approx((0, 0.01 * (-2.0 * 0.7 + 0.5) + 0.002, 0))
-    assert {t.stamp_ns for t in found.values()} == {12_000_000_034}
+        assert angle_between(transforms[name].quat_xyzw, tuple(expected)) < 1e-7
+    assert transforms["left"].xyz == (0.1, 0.2, 0.0)
+    assert transforms["finger"].xyz == pytest.approx((0, 0.01 * (-2.0 * 0.7 + 0.5) + 0.002, 0))
+    assert {t.stamp_ns for t in transforms.values()} == {12_000_000_034}
 
 
 def test_a_parameter_of_another_type_is_refused_with_a_sentence(start: Make, rover: Any) -> None:
@@ -124,24 +124,24 @@ def test_a_parameter_of_another_type_is_refused_with_a_sentence(start: Make, rov
     assert "publish_frequency" in line
 
 
-def test_the_description_is_latched_and_another_one_is_reported_once_with_its_publisher(
+def test_the_description_is_latched_and_another_is_reported_once(
     start: Make, node: Any, write: Make
 ) -> None:
     process = start("static", write([], PlanProcess("static", "static")), "static")
     process.until_says("edge")
     assert described(node) == "<robot name='rover'/>"
     texts = ("rover", "stranger", "third")
-    same, other = (
+    same, different = (
         latch(node, "/rover/robot_description", f"<robot name='{name}'/>") for name in texts[:2]
     )
     process.until_says("/test/of_the_test publishes another /rover/robot_description")
-    other.publish(String(data=f"<robot name='{texts[2]}'/>"))
+    different.publish(String(data=f"<robot name='{texts[2]}'/>"))
     time.sleep(0.5)
     assert process.output.count("another") == 1
     assert same
 
 
-def test_every_process_ends_before_its_next_message_and_reports_once_that_no_time_comes(
+def test_processes_end_before_their_next_message_and_report_no_time_once(
     start: Make, edge: Make, write: Make
 ) -> None:
     """An interrupt ends them as silently whenever ``up`` does."""

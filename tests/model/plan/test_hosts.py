@@ -34,7 +34,7 @@ def started(plan: Plan | Finding) -> set[str]:
         (NAMED, [(None, "jetson.lan"), (None, "main")]),
     ],
 )
-def test_every_process_is_started_by_exactly_one_machine_and_the_guard_by_each(
+def test_exactly_one_machine_starts_each_process_and_each_its_guard(
     text: str, machines: list[tuple[str | None, str]]
 ) -> None:
     plan = compiled_plan(text)
@@ -84,15 +84,15 @@ def test_a_plan_without_hosts_is_complete_on_every_machine() -> None:
 def test_a_host_that_the_plan_does_not_know_is_a_finding(
     text: str, requested: str | None, names: list[str]
 ) -> None:
-    found = share_of(compiled_plan(text), requested, "desk")
-    assert isinstance(found, Finding)
-    expect(found, "TF819", *names)
+    result = share_of(compiled_plan(text), requested, "desk")
+    assert isinstance(result, Finding)
+    expect(result, "TF819", *names)
 
 
 STRICT = "guard: {mode: strict}\n"
 
 
-def test_each_machine_of_a_strict_plan_hears_the_other_guard_and_has_a_fence() -> None:
+def test_each_machine_of_a_strict_plan_has_a_fence_and_hears_other_guards() -> None:
     plan = compiled_plan(ON_TWO_HOSTS + STRICT)
     shares = [
         share
@@ -108,12 +108,12 @@ def test_each_machine_of_a_strict_plan_hears_the_other_guard_and_has_a_fence() -
         assert relays_of(each_plan) == {"/tfcompose_guard", "/tfcompose_guard_jetson"}
 
 
-def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_others() -> None:
-    found = share_of(
+def test_a_strict_guard_on_one_machine_passes_on_no_edges_of_others() -> None:
+    result = share_of(
         compiled_plan(ON_TWO_HOSTS + "  guard: {host: jetson}\n" + STRICT), "jetson", "x"
     )
-    assert isinstance(found, Finding)
-    expect(found, "TF819", "jetson", "guard: {mode: watch}")
+    assert isinstance(result, Finding)
+    expect(result, "TF819", "jetson", "guard: {mode: watch}")
 
 
 def test_a_share_is_saved_and_read_and_has_a_folder_of_its_own(tmp_path: Path) -> None:

@@ -18,14 +18,12 @@ def test_a_plan_without_a_middleware_says_nothing_of_one() -> None:
     assert middleware_variables(RosSettings(router="tcp/a:7447"), {}) == {}
 
 
-def test_cyclone_takes_more_than_33_processes_of_one_computer_unless_the_user_configures_it() -> (
-    None
-):
+def test_cyclone_takes_over_33_processes_per_computer_unless_configured() -> None:
     ros = RosSettings(rmw="cyclonedds", discovery="localhost")
-    found = middleware_variables(ros, {})
-    assert found["RMW_IMPLEMENTATION"] == "rmw_cyclonedds_cpp"
-    assert "<MaxAutoParticipantIndex>119<" in found["CYCLONEDDS_URI"]
-    assert found == middleware_variables(
+    variables = middleware_variables(ros, {})
+    assert variables["RMW_IMPLEMENTATION"] == "rmw_cyclonedds_cpp"
+    assert "<MaxAutoParticipantIndex>119<" in variables["CYCLONEDDS_URI"]
+    assert variables == middleware_variables(
         RosSettings(rmw="cyclonedds"), {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     )
     assert "CYCLONEDDS_URI" not in middleware_variables(
@@ -36,7 +34,7 @@ def test_cyclone_takes_more_than_33_processes_of_one_computer_unless_the_user_co
     )
 
 
-def test_sessions_are_clients_of_a_router_that_is_named_and_else_as_zenoh_has_it() -> None:
+def test_sessions_are_clients_of_a_named_router_and_else_zenohs_default() -> None:
     assert middleware_variables(RosSettings(rmw="zenoh"), {}) == {
         "RMW_IMPLEMENTATION": "rmw_zenoh_cpp"
     }

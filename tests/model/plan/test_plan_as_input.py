@@ -45,8 +45,8 @@ WRONG: dict[str, Callable[[dict[str, Any]], Any]] = {
     "an escape sequence as a variable": changed(env={"\x1b[2J": "1"}),
     "a wait for nobody": changed(after={"nobody": "ready"}),
     "processes that wait for each other": lambda plan: [
-        process.update(after={other["name"]: "ready"})
-        for process, other in permutations(plan["processes"][:2])
+        process.update(after={awaited["name"]: "ready"})
+        for process, awaited in permutations(plan["processes"][:2])
     ],
     "lists as deep as JSON is read": lambda plan: plan.update(more=deep(900), robot="\ud800"),
     "an owner that is no process": lambda plan: plan["edges"][0].update(owner="nobody"),
@@ -76,8 +76,8 @@ def test_what_no_build_writes_is_refused() -> None:
 
 
 def test_all_that_is_wrong_is_found_at_once() -> None:
-    first, *others = BUILT["processes"]
-    processes = [first | {"after": {"nobody": "ready"}}, *others]
+    first, *rest = BUILT["processes"]
+    processes = [first | {"after": {"nobody": "ready"}}, *rest]
     with pytest.raises(RejectedError) as rejected:
         read_plan(json.dumps(BUILT | {"robot": "R", "processes": processes}), "plan.json")
     assert len(rejected.value.findings) == 2
@@ -114,6 +114,6 @@ def test_a_review_neither_waits_nor_reads_elsewhere_nor_moves_the_cursor(
     else:
         (folder / "p.yaml").write_text("a: 1 # \x1b[2J\x9b2J\n")
     assert main(["up", str(folder / "plan.json"), "--dry-run"]) == 0
-    shown = capsys.readouterr().out
-    assert "password" not in shown
-    assert all(line.isprintable() and not line.startswith("::") for line in shown.splitlines())
+    output = capsys.readouterr().out
+    assert "password" not in output
+    assert all(line.isprintable() and not line.startswith("::") for line in output.splitlines())

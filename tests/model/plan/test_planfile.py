@@ -112,13 +112,15 @@ WRONG: tuple[tuple[tuple[str | int, ...], Any], ...] = (
 
 def test_what_is_wrong_is_refused_with_the_path_to_it() -> None:
     for path, value in WRONG:
-        at = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+        step_path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
         match = re.search(r" - at `\$(.*)`$", refused(changed(path, value)))
         named = match[1] if match else ""
         # A key of a mapping of names is not named; a key that is missing, and a rule about
         # several, name what holds them.
         place = re.escape(named).replace(r"\[\.\.\.\]", r"\.[^.]+")
-        assert named.startswith(at) or re.fullmatch(rf"{place}(\.[^.]+|\[\d\])?", at), path
+        assert named.startswith(step_path) or re.fullmatch(
+            rf"{place}(\.[^.]+|\[\d\])?", step_path
+        ), path
 
 
 @pytest.mark.parametrize("quat_xyzw", [[0, 0, 0, 2], [0, 0, 0, 0]])

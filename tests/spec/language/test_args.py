@@ -67,7 +67,7 @@ frames:
     ("given", "environment", "count"),
     [({}, {}, 2), ({"cameras": "3"}, {"CAMERAS": "1"}, 3), ({}, {"CAMERAS": "1"}, 1)],
 )
-def test_the_command_line_goes_before_the_environment_and_that_before_the_default(
+def test_the_command_line_precedes_the_environment_and_that_the_default(
     given: dict[str, str], environment: dict[str, str], count: int
 ) -> None:
     made = robot(built(CAMERAS, given, environment))
@@ -141,7 +141,7 @@ processes:
     assert process.required is True
 
 
-def test_what_is_left_out_is_not_waited_for_and_what_is_misspelt_is_still_found() -> None:
+def test_an_omitted_process_is_not_awaited_and_a_misspelt_one_is_found() -> None:
     text = """\
 args: {sim: false, n: 2}
 processes:
@@ -180,8 +180,8 @@ def test_a_condition_or_a_loop_that_cannot_be_decided_is_one_finding(
     compiled = built(
         f"frames:\n  {entry}\nargs: {{n: 1}}\nvars: {{v: '${{args.n}}'}}\nxml: '${{v}}'\n"
     )
-    found = [place for place in places(compiled) if place[0] == "TF105"]
-    assert found == [("TF105", "r.yaml", line)]
+    conditions = [place for place in places(compiled) if place[0] == "TF105"]
+    assert conditions == [("TF105", "r.yaml", line)]
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_loops_over_several_variables_make_every_combination() -> None:
     assert {*robot(built(text)).frames} == {"base_link", "left_1", "left_2", "right_1", "right_2"}
 
 
-def test_a_profile_with_a_condition_is_applied_where_it_holds_and_where_it_is_named() -> None:
+def test_a_conditional_profile_applies_if_it_holds_or_is_named() -> None:
     text = """\
 args: {sim: false}
 profiles:
@@ -242,7 +242,7 @@ def test_a_part_is_given_its_arguments_and_an_including_file_sets_defaults() -> 
     )
 
 
-def test_the_environment_is_read_when_it_is_named_and_the_plan_has_what_it_was() -> None:
+def test_a_named_environment_variable_is_read_and_recorded_in_the_plan() -> None:
     text = """\
 vars: {mast: "${env(MAST, 30 cm)}"}
 frames: {a: {parent: base_link, xyz: [0, 0, "${mast}"]}}
@@ -252,9 +252,9 @@ processes: {p: {run: [x, "dev_${env(PORT)}"]}}
     assert plan.environment == {"MAST": "30 cm", "PORT": "0.50"}
     assert plan.process("p").argv == ("x", "dev_0.50")
     assert plan.edges[0].pose.xyz == (0, 0, 0.3)
-    other = plan_of(robot(built(text, environment={"PORT": "0.50", "MAST": "1 m"})))
-    assert other.edges[0].pose.xyz == (0, 0, 1)
-    assert other.spec_digest != plan.spec_digest
+    second_plan = plan_of(robot(built(text, environment={"PORT": "0.50", "MAST": "1 m"})))
+    assert second_plan.edges[0].pose.xyz == (0, 0, 1)
+    assert second_plan.spec_digest != plan.spec_digest
     assert [finding.code for finding in built(text).errors] == ["TF105"]
 
 
@@ -321,7 +321,7 @@ def test_what_a_profile_replaced_in_an_entry_that_a_loop_makes_is_noted() -> Non
 @pytest.mark.parametrize(
     ("declared", "type_"), [("{type: float, default: 3}", float), ("3.0", float), ("3", int)]
 )
-def test_a_parameter_has_the_type_of_its_argument_whatever_the_form_of_the_value(
+def test_a_parameter_takes_its_arguments_type_in_any_form_of_the_value(
     declared: str, type_: type
 ) -> None:
     text = (

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.cli import tfcompose_in
-from tfcompose.spec.language.habits import habit
+from tfcompose.spec.language.key_hints import habit
 from tfcompose.spec.language.values import COLOURS
 
 BASE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
@@ -53,9 +53,7 @@ def check_mistake(folder: Path, text: str, place: str, code: str, words: str) ->
 
 
 @pytest.mark.parametrize("text", MISTAKES)
-def test_a_mistake_is_found_at_its_place_with_help_that_names_what_to_write(
-    text: str, tmp_path: Path
-) -> None:
+def test_a_mistake_is_found_at_its_place_and_help_shows_the_fix(text: str, tmp_path: Path) -> None:
     text = text if text.startswith("tfcompose") else BASE + text
     marks = [(number, MARK.search(line)) for number, line in enumerate(text.splitlines(), 1)]
     ((number, mark),) = [(number, mark) for number, mark in marks if mark]

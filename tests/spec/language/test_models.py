@@ -52,7 +52,7 @@ BOUNDS = {
     "tuple": set(),
 }
 
-LANGUAGES = {name: model_of(name) for name in ("robot", "preset", "node", "fleet")}
+LANGUAGES = {name: model_of(name) for name in ("robot", "preset", "node", "fleet", "test")}
 ROOTS: dict[str, type[Spec]] = LANGUAGES | {
     name: kind
     for name, kind in vars(calibration).items()
@@ -86,9 +86,9 @@ def schemas(schema: Any) -> Iterator[dict[str, Any]]:
 def test_every_kind_of_error_that_a_model_can_raise_has_words_of_ours(root: str) -> None:
     model = ROOTS[root]
     model.model_rebuild(force=True, _types_namespace=None)
-    found = list(schemas(model.__pydantic_core_schema__))
-    assert found
-    for schema in found:
+    core_schemas = list(schemas(model.__pydantic_core_schema__))
+    assert core_schemas
+    for schema in core_schemas:
         kind = schema["type"]
         assert kind in RAISES, f"a {kind} schema: which errors it raises is to be said here"
         if kind in BOUNDS:
@@ -104,7 +104,7 @@ def _structure(kind: str) -> set[str]:
     }.get(kind, set())
 
 
-def test_an_error_of_a_kind_that_nobody_foresaw_is_worded_without_pydantic_s_english() -> None:
+def test_an_error_of_an_unforeseen_kind_is_worded_without_pydantic() -> None:
     class Later(Spec):
         """A model with a type that the language does not use."""
 
@@ -118,9 +118,9 @@ def test_an_error_of_a_kind_that_nobody_foresaw_is_worded_without_pydantic_s_eng
 
 
 def test_every_error_kind_in_the_table_is_one_of_pydantic_s() -> None:
-    known = set(get_args(core_schema.ErrorType))
-    assert WORDS.keys() <= known
-    assert known >= WORDED
+    error_types = set(get_args(core_schema.ErrorType))
+    assert WORDS.keys() <= error_types
+    assert error_types >= WORDED
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -139,8 +139,8 @@ def test_every_key_has_a_meaning_and_every_key_of_a_robot_an_example(language: s
 def test_a_mapping_s_own_keys_stand_before_those_that_it_inherits(language: str) -> None:
     for _, kind in walk(LANGUAGES[language]):
         names = [name.rstrip("_") for name in kind.__annotations__]  # for_ and from_ have aliases
-        own = [name for name in names if name in fields_of(kind)]
-        assert list(fields_of(kind))[: len(own)] == own, kind
+        own_names = [name for name in names if name in fields_of(kind)]
+        assert list(fields_of(kind))[: len(own_names)] == own_names, kind
 
 
 def test_the_reference_has_every_key_of_the_language_with_its_unit() -> None:

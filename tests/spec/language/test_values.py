@@ -120,9 +120,9 @@ EXPRESSIONS = {
 
 @pytest.mark.parametrize("text", EXPRESSIONS)
 def test_an_expression_has_its_value(text: str) -> None:
-    found = evaluate(text, lambda name: pytest.fail(f"{name} was looked up"))
-    assert isinstance(found, Quantity)
-    assert found.value == pytest.approx(EXPRESSIONS[text], abs=1e-15)
+    result = evaluate(text, lambda name: pytest.fail(f"{name} was looked up"))
+    assert isinstance(result, Quantity)
+    assert result.value == pytest.approx(EXPRESSIONS[text], abs=1e-15)
 
 
 CHOICES = {
@@ -144,9 +144,9 @@ NO_CHOICES = (
 
 @pytest.mark.parametrize("text", CHOICES)
 def test_an_expression_chooses_between_two_values(text: str) -> None:
-    found = evaluate(text, lambda _name: "right")
-    assert isinstance(found, Quantity)
-    assert found.value == CHOICES[text]
+    result = evaluate(text, lambda _name: "right")
+    assert isinstance(result, Quantity)
+    assert result.value == CHOICES[text]
 
 
 def test_an_expression_chooses_between_two_texts() -> None:
@@ -186,9 +186,9 @@ def test_arithmetic_agrees_with_pythons(text: str) -> None:
         with pytest.raises(ExpressionError, match="divides by zero"):
             evaluate(text, pytest.fail)
         return
-    found = evaluate(text, pytest.fail)
-    assert isinstance(found, Quantity)
-    assert found.value == pytest.approx(expected, rel=1e-12)
+    result = evaluate(text, pytest.fail)
+    assert isinstance(result, Quantity)
+    assert result.value == pytest.approx(expected, rel=1e-12)
 
 
 UNCOMPUTABLE = [
@@ -260,7 +260,7 @@ def test_a_chain_of_a_thousand_variables_is_computed() -> None:
     assert value_of('"${v0}"', f"{{{links}, v1000: 0}}") == 1000
 
 
-def test_variables_that_need_each_other_are_one_finding_that_shows_the_circle() -> None:
+def test_circular_variables_are_one_finding_that_shows_the_circle() -> None:
     findings = validated(
         'vars: {a: "${b}", b: "${c}", c: "${a}"}\nframes: {f: {parent: b, xyz: ["${a}", 0, 0]}}\n'
     ).findings
@@ -320,10 +320,10 @@ ROTATIONS = {
 def test_each_way_to_write_a_rotation_agrees_with_scipy(source_text: str) -> None:
     done = validated(f"frames: {{a: {{parent: b, {source_text}}}}}\n")
     assert not done.findings
-    found = done.spec.frames["a"].rotation
-    assert found
+    quat_xyzw = done.spec.frames["a"].rotation
+    assert quat_xyzw
     x, y, z, w = ROTATIONS[source_text].as_quat()
-    assert angle_between(found, (x, y, z, w)) < 1e-9
+    assert angle_between(quat_xyzw, (x, y, z, w)) < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ def test_files_that_include_each_other_are_refused_with_the_circle() -> None:
     assert "robot.yaml → a.yaml → robot.yaml" in finding.message
 
 
-def test_a_file_that_is_not_there_is_reported_with_the_place_that_includes_it() -> None:
+def test_a_missing_file_is_reported_at_the_place_that_includes_it() -> None:
     (finding,) = refused({"robot.yaml": "robot: r\ninclude:\n  - nope.yaml\n"})
     assert finding.code == "TF001"
     assert [(note.message, str(note.span)) for note in finding.notes] == [
@@ -146,7 +146,7 @@ def test_an_overlay_that_is_empty_where_something_stands_is_a_finding(
     assert (finding.code, str(finding.span)) == ("TF014", place)
 
 
-def test_an_overlay_may_say_which_language_it_is_in_and_bring_what_is_new_and_empty() -> None:
+def test_an_overlay_may_name_its_language_and_bring_new_or_empty_values() -> None:
     assert not compose(
         load("tfcompose: 1\na: {}\n", "f"), [], [load("tfcompose: 1\na: {b: {}}\n", "o")]
     ).findings

@@ -151,9 +151,7 @@ def test_what_is_not_there_has_the_place_of_what_is_around_it() -> None:
     assert Source("f", Location(Span("f")), {}).span_of(("a",)) == Span("f")
 
 
-def test_the_first_of_two_equal_keys_counts_and_the_second_is_a_finding_that_shows_the_first() -> (
-    None
-):
+def test_a_duplicate_key_is_a_finding_that_shows_the_first_which_counts() -> None:
     source = load("a: 1\nb: 2\na: 3\n", "f")
     assert source.data == {"a": 1, "b": 2}
     (finding,) = source.findings
@@ -304,7 +302,7 @@ LARGE = {
 }
 
 
-def test_what_is_too_large_for_a_robot_is_refused_no_later_than_the_largest_file_is_read() -> None:
+def test_an_oversized_input_is_refused_before_the_largest_file_is_read() -> None:
     def seconds(text: str) -> float:
         began = time.process_time()
         load(text, "f")
@@ -330,7 +328,7 @@ def test_what_is_too_large_for_a_robot_is_refused_no_later_than_the_largest_file
         ("no key where one must be", "a: 1\n" + "[" * 2000, ("TF002", 2, 1)),
     ],
 )
-def test_text_that_is_nested_too_deep_is_refused_at_the_first_level_too_many(
+def test_text_nested_too_deep_is_refused_at_the_first_excess_level(
     case: str, text: str, expected: tuple[str, int, int]
 ) -> None:
     """Versions of PyYAML differ in how far they read ahead, and in how deep they go themselves."""
@@ -414,7 +412,7 @@ def test_laying_a_profile_over_leaves_the_source_as_it_was() -> None:
     assert (str(source.data), spans_of(source)) == before
 
 
-def test_a_null_that_removes_nothing_is_a_finding_at_its_place_also_in_a_list() -> None:
+def test_a_null_that_removes_nothing_is_a_finding_even_in_a_list() -> None:
     findings = validate(
         laid("tfcompose: 1\nrobot: r\nbase:\nvars: {c: ~}\ninclude: [a, null]\n")
     ).findings
@@ -474,7 +472,7 @@ def test_faults_below_an_anchor_are_reported_once_and_only_if_it_is_used() -> No
     assert places == [("TF004", 2, 28), ("TF004", 4, 18), ("TF005", 2, 19), ("TF007", 2, 38)]
 
 
-def test_an_alias_is_the_value_of_its_anchor_with_its_place_and_a_key_of_its_own() -> None:
+def test_an_alias_has_the_value_and_place_of_its_anchor_and_its_own_key() -> None:
     source = load("x-a: &a {k: [1]}\none: *a\ntwo: {b: *a}\n", "f")
     assert source.data["one"] is source.data["two"]["b"]
     assert source.span_of(("two", "b", "k", 0)) == Span("f", 1, 14, 1, 15)

@@ -151,18 +151,19 @@ def test_echo_follows_a_recording_at_the_rate_that_is_requested(
     tmp_path: Path, *, mcap: bool
 ) -> None:
     bag = str(write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap))
-    found = poses("odom", "laser_link", "--bag", bag, "--rate", "2")
-    assert found == [
-        (pytest.approx(at), pytest.approx(at, abs=1e-6)) for at in (0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5)
+    rows = poses("odom", "laser_link", "--bag", bag, "--rate", "2")
+    assert rows == [
+        (pytest.approx(time_s), pytest.approx(time_s, abs=1e-6))
+        for time_s in (0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5)
     ]
 
 
 def test_echo_says_the_first_pose_the_one_at_a_time_or_the_fixed_one(tmp_path: Path) -> None:
     bag = str(write_bag(tmp_path / "bag", [*FIXED, *drive(30.0)]))
     assert poses("odom", "base_link", "--bag", bag, "--once") == [(0.0, 0.0)]
-    for at in (0.013, 2.25, 29.5):
-        [(x, stamp)] = poses("odom", "base_link", "--bag", bag, "--at", f"{START_S + at:.9f}")
-        assert (x, stamp) == (pytest.approx(at, abs=1e-6), pytest.approx(at, abs=1e-6))
+    for time_s in (0.013, 2.25, 29.5):
+        [(x, stamp)] = poses("odom", "base_link", "--bag", bag, "--at", f"{START_S + time_s:.9f}")
+        assert (x, stamp) == (pytest.approx(time_s, abs=1e-6), pytest.approx(time_s, abs=1e-6))
     [(x, _)] = poses("odom", "base_link", "--bag", bag, "--at=-0.5")
     assert x == pytest.approx(29.98 - 0.5)
     assert poses("base_link", "laser_link", "--bag", bag) == [(0.0, None)]
@@ -217,13 +218,13 @@ def test_a_bag_that_was_split_is_read_in_order_without_its_metadata_too(
     base = edges(tfcompose("monitor", "--bag", folder, "--format", "json"))["base_link"]
     assert (base["count"], base["stamps_back"]) == (550, 0)
     assert base["longest_gap_s"] == pytest.approx(0.02, abs=1e-5)
-    stamps = [at for _, at in poses("odom", "base_link", "--bag", str(folder))]
+    stamps = [time_s for _, time_s in poses("odom", "base_link", "--bag", str(folder))]
     assert stamps == pytest.approx(list(range(11)), abs=0.03)
 
 
 def test_a_bag_without_messages_differs_from_one_of_another_type(tmp_path: Path) -> None:
     text = ("/tf", 0.0, "std_msgs/msg/String", STORE.types["std_msgs/msg/String"]("a"))
-    strange = write_bag(tmp_path / "strange", [], others=[text])
+    strange = write_bag(tmp_path / "strange", [], messages=[text])
     errors = tfcompose("monitor", "--bag", strange, code=2).stderr
     assert all(
         name in errors
@@ -240,20 +241,22 @@ def test_a_bag_with_another_definition_of_the_message_is_not_misread(tmp_path: P
     """Somebody put a number behind the transforms."""
     store = get_typestore(Stores.ROS2_JAZZY)
     changed = "geometry_msgs/TransformStamped[] transforms\nint32 number\n"
-    other = get_typestore(Stores.EMPTY)
-    other.register(
+    changed_store = get_typestore(Stores.EMPTY)
+    changed_store.register(
         {
             name: fields
             for name, fields in store.fielddefs.items()
             if name != "tf2_msgs/msg/TFMessage"
         }
     )
-    other.register(get_types_from_msg(changed, "tf2_msgs/msg/TFMessage"))
+    changed_store.register(get_types_from_msg(changed, "tf2_msgs/msg/TFMessage"))
     bag = tmp_path / "bag"
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=other)
-        message = other.types["tf2_msgs/msg/TFMessage"]([], 7)
-        writer.write(connection, 1, other.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
+        connection = writer.add_connection(
+            "/tf", "tf2_msgs/msg/TFMessage", typestore=changed_store
+        )
+        message = changed_store.types["tf2_msgs/msg/TFMessage"]([], 7)
+        writer.write(connection, 1, changed_store.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
     errors = tfcompose("monitor", "--bag", bag, code=2).stderr
     assert all(name in errors for name in ("error[TF907]", "/tf", "tf2_msgs/msg/TFMessage"))
 
@@ -262,13 +265,13 @@ def test_messages_that_cannot_be_read_are_counted(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=STORE)
-        for at in range(3):
-            writer.write(connection, at, b"\x00\x01\x00\x00\xff\xff\xff\x7f none")
+        for time_ns in range(3):
+            writer.write(connection, time_ns, b"\x00\x01\x00\x00\xff\xff\xff\x7f none")
     output = tfcompose("monitor", "--bag", bag).stdout
     assert all(number in output for number in ("0 edges", "0 messages", "3 unreadable"))
 
 
-def test_stamps_of_a_simulation_are_compared_with_the_clock_that_was_recorded(
+def test_stamps_of_a_simulation_are_compared_with_the_recorded_clock(
     tmp_path: Path,
 ) -> None:
     def clock(at_s: float) -> tuple[str, float, str, Any]:
@@ -282,9 +285,12 @@ def test_stamps_of_a_simulation_are_compared_with_the_clock_that_was_recorded(
         )
 
     sent: list[Sent] = [
-        (topic, at, a, b, stamp - START_S, xyz, q) for topic, at, a, b, stamp, xyz, q in drive()
+        (topic, time_s, a, b, stamp - START_S, xyz, q)
+        for topic, time_s, a, b, stamp, xyz, q in drive()
     ]
-    with_clock = write_bag(tmp_path / "sim", sent, others=[clock(at / 100) for at in range(400)])
+    with_clock = write_bag(
+        tmp_path / "sim", sent, messages=[clock(index / 100) for index in range(400)]
+    )
     without = write_bag(tmp_path / "lost", sent)
     base = edges(tfcompose("monitor", "--bag", str(with_clock), "--format", "json"))["base_link"]
     assert base["delay_s"] == pytest.approx(0.0, abs=0.011)
@@ -298,8 +304,8 @@ def test_what_ended_before_the_recording_did_is_silent(tmp_path: Path) -> None:
         " rate: 50 Hz}}, processes: {drive: {external: true, node: diff_drive}}}"
     )
     text = STORE.types["std_msgs/msg/String"]("a")
-    chatter = [("/chatter", float(at), "std_msgs/msg/String", text) for at in range(20)]
-    bag = write_bag(tmp_path / "bag", drive(4.0), others=chatter)
+    chatter = [("/chatter", float(second), "std_msgs/msg/String", text) for second in range(20)]
+    bag = write_bag(tmp_path / "bag", drive(4.0), messages=chatter)
     output = tfcompose("verify", str(robot), "--bag", str(bag), code=1).stdout
     assert all(
         name in output

@@ -37,9 +37,9 @@ def add(  # noqa: PLR0913 (a stream has that many parts)
 
 
 def between(observer: TreeObserver, a: str, b: str) -> FrameChain:
-    found = chain_between(observer.edges(4 * SECOND), a, b)
-    assert isinstance(found, FrameChain), found
-    return found
+    chain = chain_between(observer.edges(4 * SECOND), a, b)
+    assert isinstance(chain, FrameChain), chain
+    return chain
 
 
 @pytest.mark.parametrize(
@@ -52,12 +52,12 @@ def between(observer: TreeObserver, a: str, b: str) -> FrameChain:
     ],
 )
 def test_the_chain_goes_up_to_where_the_ways_meet_and_down(a: str, b: str, frames: str) -> None:
-    found = between(
+    chain = between(
         observed("map odom", "odom base", "base laser", "base camera", "odom lamp"), a, b
     )
-    assert found.frames == tuple(frames.split())
-    pairs = [{edge.parent, edge.child} for edge in found.newest]
-    assert pairs == [set(pair) for pair in zip(found.frames, found.frames[1:], strict=False)]
+    assert chain.frames == tuple(frames.split())
+    pairs = [{edge.parent, edge.child} for edge in chain.newest]
+    assert pairs == [set(pair) for pair in zip(chain.frames, chain.frames[1:], strict=False)]
 
 
 def test_the_pose_is_as_old_as_the_edge_that_is_the_most_behind() -> None:
@@ -74,8 +74,8 @@ def test_the_pose_is_as_old_as_the_edge_that_is_the_most_behind() -> None:
 def test_of_several_publishers_the_newest_counts_and_all_are_shown() -> None:
     observer = observed("odom base", until_ms=3000)
     add(observer, "map base", gid=b"2")
-    found = between(observer, "map", "base")
-    assert [edge.parent for edge in found.all_edges] == ["map", "odom"]
+    chain = between(observer, "map", "base")
+    assert [edge.parent for edge in chain.all_edges] == ["map", "odom"]
     observer.take_graph([Publisher(b"1", "/drive", static=False)])
     assert between(observer, "odom", "base").frames == (
         "odom",

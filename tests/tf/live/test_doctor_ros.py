@@ -224,25 +224,25 @@ def test_what_is_wrong_is_found_with_the_nodes_and_the_numbers(
     scene(nodes)
 
     def are_found(seconds: float) -> None:
-        exit_code, found = doctor(seconds=seconds)
+        exit_code, findings = doctor(seconds=seconds)
         assert exit_code == 1
         for code, names in SCENES[scene].items():
-            text = messages_of(found, code)
+            text = messages_of(findings, code)
             assert [name for name in names if name not in text] == [], text
-        assert {entry["code"] for entry in found if not in_a_pause(entry)} <= {
+        assert {entry["code"] for entry in findings if not in_a_pause(entry)} <= {
             *SCENES[scene],
             *LATE,
-        }, found
+        }, findings
 
     at_last(are_found)
 
 
-def in_a_pause(found: dict[str, Any]) -> bool:
+def in_a_pause(entry: dict[str, Any]) -> bool:
     """Return whether the observation ended during /paused's pause.
 
     It pauses half of the time.
     """
-    return found["code"] == "TF804" and str(found["message"]).startswith("/paused ")
+    return entry["code"] == "TF804" and str(entry["message"]).startswith("/paused ")
 
 
 def test_a_sound_robot_gives_no_finding_and_exit_code_0(nodes: FakeNodes) -> None:
@@ -261,8 +261,8 @@ def odometry(now: int) -> Odometry:
 
 @pytest.mark.usefixtures("nodes")
 def test_where_nothing_runs_it_reports_with_which_settings_it_observed(domain: Any) -> None:
-    code, found = doctor(seconds=1.0)
-    text = messages_of(found, "TF845")
+    code, findings = doctor(seconds=1.0)
+    text = messages_of(findings, "TF845")
     assert code == 1
     assert f"ROS_DOMAIN_ID={domain.id}, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in text
 
@@ -343,12 +343,12 @@ def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: 
         try:
             assert talker.stdout
             assert talker.stdout.readline() == "up\n"
-            found = doctor_finds({"TF834": ["/far"]}, set())
+            findings = doctor_finds({"TF834": ["/far"]}, set())
         finally:
             talker.kill()
-    text = messages_of(found, "TF834")
+    text = messages_of(findings, "TF834")
     assert re.search(r" (3|2\.9\d) s ahead ", text), text
-    assert {entry["code"] for entry in found} == {"TF834"}
+    assert {entry["code"] for entry in findings} == {"TF834"}
 
 
 def test_a_robot_as_planned_gives_no_finding_and_each_difference_is_one(
@@ -466,10 +466,10 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
         try:
             assert process.stdout
             assert process.stdout.readline() == "up\n"
-            _, found = doctor(seconds=1.0)
+            _, findings = doctor(seconds=1.0)
         finally:
             process.kill()
-    text = messages_of(found, "TF908")
+    text = messages_of(findings, "TF908")
     assert "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp" in text
     assert "rmw_fastrtps_cpp" in text
     assert f"pid {process.pid}: " in text
@@ -485,7 +485,7 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
     ],
 )
 @pytest.mark.usefixtures("domain")
-def test_settings_with_which_ros_does_not_start_are_reported_by_every_live_command(
+def test_every_live_command_reports_settings_that_keep_ros_from_starting(
     monkeypatch: pytest.MonkeyPatch, command: str, setting: str, code: str, exit_code: int
 ) -> None:
     """ROS itself ends the process, with exit code 102, or with Fast DDS's own words."""

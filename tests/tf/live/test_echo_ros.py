@@ -185,7 +185,7 @@ def running(domain: Any) -> Iterator[Callable[..., subprocess.Popen[str]]]:
         process.communicate()
 
 
-def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as_requested(
+def test_the_pose_at_a_time_is_interpolated_with_the_requested_decimals(
     running: Callable[..., subprocess.Popen[str]],
 ) -> None:
     words = ["--at", "101.25", "--precision", "2", "--timeout", "60"]
@@ -235,8 +235,8 @@ def test_under_a_namespace_only_its_topics_are_heard(
     running: Callable[..., subprocess.Popen[str]],
 ) -> None:
     with open_node("talks", "") as node:
-        ours, others = Talker(node, "/robot1"), Talker(node)
-        others.say("odom", "base_link", 9.0)
+        ours, foreign = Talker(node, "/robot1"), Talker(node)
+        foreign.say("odom", "base_link", 9.0)
         ours.say("odom", "base_link", 1.0)
         words = ["--namespace", "robot1", "--format", "json", "--timeout", "60"]
         process = running("odom", "base_link", "--once", *words)
@@ -268,7 +268,7 @@ def test_why_no_pose_comes_is_reported(
 
 
 @pytest.mark.usefixtures("domain")
-def test_when_simulated_time_starts_again_it_goes_on_without_what_was_sent_before(
+def test_a_restart_of_simulated_time_discards_earlier_transforms(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A bag that is played with its clock, again and again.

@@ -39,11 +39,11 @@ def test_rate_jitter_gaps_and_delays_are_those_of_the_standard_library() -> None
     rng = random.Random(7)
     gaps = [int(rng.uniform(0.01, 0.03) * S) for _ in range(500)]
     delays = [int(rng.uniform(-0.002, 0.02) * S) for _ in range(501)]
-    observer, at = TreeObserver(), 100 * S
+    observer, now_ns = TreeObserver(), 100 * S
     for gap, delay in zip([0, *gaps], delays, strict=True):
-        at += gap
-        take(observer, "odom base_link", at, at - delay)
-    observed = only(observer, at)
+        now_ns += gap
+        take(observer, "odom base_link", now_ns, now_ns - delay)
+    observed = only(observer, now_ns)
     timing = observed.timing
     assert timing.rate == pytest.approx(500 / (sum(gaps) / S))
     assert timing.jitter_s == pytest.approx(statistics.pstdev(gaps) / S, rel=1e-6)
@@ -56,49 +56,49 @@ def test_rate_jitter_gaps_and_delays_are_those_of_the_standard_library() -> None
 
 
 @pytest.mark.parametrize("pause_s", [6, 25])
-def test_after_a_pause_longer_than_the_window_the_rate_is_at_once_that_since_it(
+def test_after_a_pause_beyond_the_window_the_rate_counts_from_its_end(
     pause_s: int,
 ) -> None:
-    observer, at = TreeObserver(window_s=5.0), 0
+    observer, now_ns = TreeObserver(window_s=5.0), 0
 
     def send(seconds: float, hertz: int = 20) -> None:
-        nonlocal at
+        nonlocal now_ns
         for _ in range(round(seconds * hertz)):
-            at += S // hertz
-            take(observer, "odom base_link", at)
+            now_ns += S // hertz
+            take(observer, "odom base_link", now_ns)
 
     send(8.0)
-    at += pause_s * S - S // 20
+    now_ns += pause_s * S - S // 20
     send(1.0)
-    timing = only(observer, at).timing
+    timing = only(observer, now_ns).timing
     assert timing.rate == pytest.approx(20)
     assert timing.longest_gap_s == pytest.approx(pause_s)
     assert timing.since_gap_s == pytest.approx(0.95)
-    assert (only(observer, at + 2 * S).timing.rate or 20) < 10, "it falls while nothing comes"
+    assert (only(observer, now_ns + 2 * S).timing.rate or 20) < 10, "it falls while nothing comes"
     send(4.5)
-    assert only(observer, at).timing.longest_gap_s == pytest.approx(0.05)
+    assert only(observer, now_ns).timing.longest_gap_s == pytest.approx(0.05)
 
 
-def test_an_edge_that_comes_less_often_than_the_window_is_long_has_its_rate() -> None:
+def test_an_edge_rarer_than_the_window_keeps_its_rate() -> None:
     observer = TreeObserver(window_s=2.0)
-    for at in range(0, 100 * S, 10 * S):
-        take(observer, "map odom", S + at)
+    for offset_ns in range(0, 100 * S, 10 * S):
+        take(observer, "map odom", S + offset_ns)
     timing = only(observer, 91 * S).timing
     assert timing.rate == pytest.approx(0.1)
     assert timing.longest_gap_s == pytest.approx(10)
 
 
-def test_a_window_forgets_what_was_before_it_and_a_rate_falls_while_nothing_comes() -> None:
+def test_a_window_forgets_older_messages_and_the_rate_falls_in_silence() -> None:
     observer = TreeObserver(window_s=2.0)
-    at = 0
+    now_ns = 0
     for _ in range(100):  # 10 Hz for 10 s, then 50 Hz
-        at += S // 10
-        take(observer, "odom base_link", at)
+        now_ns += S // 10
+        take(observer, "odom base_link", now_ns)
     for _ in range(300):
-        at += S // 50
-        take(observer, "odom base_link", at)
-    assert only(observer, at).timing.rate == pytest.approx(50, rel=0.01)
-    later = only(observer, at + 10 * S)
+        now_ns += S // 50
+        take(observer, "odom base_link", now_ns)
+    assert only(observer, now_ns).timing.rate == pytest.approx(50, rel=0.01)
+    later = only(observer, now_ns + 10 * S)
     assert later.age_s == 10
     assert later.timing.rate is not None
     assert later.timing.rate < 25
@@ -135,8 +135,8 @@ def test_without_ids_the_publisher_is_one_of_those_on_its_topic() -> None:
 
 def test_stamps_that_go_back_or_repeat_are_counted() -> None:
     observer = TreeObserver()
-    for at, stamp in enumerate((5, 6, 6, 4, 5, 9)):
-        take(observer, "odom base_link", at * S, stamp * S)
+    for index, stamp in enumerate((5, 6, 6, 4, 5, 9)):
+        take(observer, "odom base_link", index * S, stamp * S)
     stream = only(observer, 6 * S).stream
     assert (stream.stamps_back, stream.stamps_repeated, stream.newest_ns) == (1, 1, 9 * S)
 
@@ -180,7 +180,7 @@ def test_a_flood_of_names_is_counted_and_not_kept(monkeypatch: pytest.MonkeyPatc
         observer.take_graph([Publisher(number.to_bytes(16, "big"), f"/n{number}", static=False)])
     assert (len(observer.edges(S)), sum(observer.beyond.values())) == (10, 20)
     assert len(observer.malformed) <= 10
-    assert len(observer.publishers.known) <= 11
+    assert len(observer.publishers.by_gid) <= 11
 
 
 def test_stamps_are_compared_with_the_clock_that_is_given() -> None:

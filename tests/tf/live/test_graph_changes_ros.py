@@ -35,12 +35,14 @@ def test_rmw_is_queried_again_only_after_its_graph_has_changed(
         return inquire(topic, **options)
 
     monkeypatch.setattr(node, "get_publishers_info_by_topic", counted)
-    graph, other = TFGraph(node, GLOBAL), TFGraph(node, ("/a/tf", "/a/tf_static"))
+    graph, second_graph = TFGraph(node, GLOBAL), TFGraph(node, ("/a/tf", "/a/tf_static"))
     assert ask(graph) == []
     assert len(inquiries) == len(GLOBAL)
 
     def names() -> list[str | None]:
-        assert other.publishers() is not None  # one context's graphs take no change from others
+        assert (
+            second_graph.publishers() is not None
+        )  # one context's graphs take no change from others
         return [publisher.node for publisher in ask(graph)]
 
     with open_node("drive", "/rover") as drive:
@@ -60,7 +62,7 @@ def test_graphs_of_one_context_share_their_changes(node: Any) -> None:
     assert graph_changes(node) is graph_changes(node)
 
 
-def test_who_is_heard_outside_of_the_fence_is_not_fenced_though_the_graph_stays(
+def test_a_sender_heard_outside_the_fence_is_unfenced_in_a_constant_graph(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     writer = GraphPublisher(GID, "/drive", "volatile", "reliable", "tf2_msgs/msg/TFMessage")
@@ -70,10 +72,10 @@ def test_who_is_heard_outside_of_the_fence_is_not_fenced_though_the_graph_stays(
             return 1
 
     monkeypatch.setattr(topics, "graph_changes", lambda _: Unchanged())
-    monkeypatch.setattr(topics, "ids_say_who", lambda _: True)
+    monkeypatch.setattr(topics, "gid_identifies_node", lambda _: True)
     monkeypatch.setattr(topics, "own_gid", lambda *_: b"guard".ljust(16))
-    shown = {GLOBAL[0]: [writer], GLOBAL[1]: []}
-    monkeypatch.setattr(topics, "writers", lambda _, topic: shown[topic])
+    writers_by_topic = {GLOBAL[0]: [writer], GLOBAL[1]: []}
+    monkeypatch.setattr(topics, "writers", lambda _, topic: writers_by_topic[topic])
     node: Any = None
     graph = TFGraph(node, GLOBAL)
     graph._where[GID], graph._ours[GID] = "here", Identity(ours=True, process="drive", fenced=True)

@@ -45,14 +45,18 @@ def test_every_message_is_read_as_a_plain_decoder_does(
 
 @settings(max_examples=300, deadline=None)
 @given(TRANSFORMS, st.data())
-def test_what_is_no_message_is_refused_as_a_plain_decoder_does_also_after_good_ones(
+def test_an_invalid_message_is_refused_like_in_a_plain_decoder(
     transforms: list[SentTransform], data: st.DataObject
 ) -> None:
     good = encode(transforms)
-    at = data.draw(st.integers(0, len(good) - 1))
+    index = data.draw(st.integers(0, len(good) - 1))
     bad = data.draw(
         st.sampled_from(
-            [good[:at], good[:at] + b"\xff" + good[at + 1 :], good[:at] + b"\0" + good[at:]]
+            [
+                good[:index],
+                good[:index] + b"\xff" + good[index + 1 :],
+                good[:index] + b"\0" + good[index:],
+            ]
         )
     )
     reader = MessageReader()
@@ -88,17 +92,17 @@ def test_names_are_those_that_tf2_takes_and_can_be_shown() -> None:
     assert MessageReader().read(received(data), static=True).edges == (("map", "od\\x1bom"),)
 
 
-def test_poses_are_read_of_the_first_message_that_holds_a_frame_to_be_compared() -> None:
+def test_poses_come_from_the_first_message_with_a_frame_to_compare() -> None:
     reader = MessageReader(frozenset({"odom"}))
-    other = encode([SentTransform(1, "map", "base_link", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))])
-    assert reader.read(received(other), static=True).poses == ()
+    message = encode([SentTransform(1, "map", "base_link", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))])
+    assert reader.read(received(message), static=True).poses == ()
     data = encode([SentTransform(1, "map", "/odom", (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))])
     (pose,) = reader.read(received(data), static=True).poses
     assert pose == ((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))
     assert reader.read(received(data), static=True).poses == ()
 
 
-def test_a_description_gives_its_moving_joints_and_nothing_where_it_is_none() -> None:
+def test_a_description_gives_its_moving_joints_and_an_invalid_one_none() -> None:
     text = "<robot name='r'><link name='a'/><link name='b'/>"
     text += (
         "<joint name='j' type='revolute'><parent link='a'/><child link='b'/><mimic"

@@ -23,22 +23,27 @@ def monitor(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
 
 
 def rows(done: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = json.loads(done.stdout)["edges"]
-    return found
+    edges: list[dict[str, Any]] = json.loads(done.stdout)["edges"]
+    return edges
 
 
-def test_each_publisher_is_named_with_rate_and_delay_and_a_chain_has_a_net_delay() -> None:
+def test_each_publisher_has_rate_and_delay_and_a_chain_has_a_net_delay() -> None:
     def are_named(seconds: float) -> None:
-        found = {
+        rows_by_node = {
             each["publisher"]: each
             for each in rows(monitor("--for", str(seconds), "--format", "json"))
         }
-        assert set(found) == {"/drive", "/ekf", "/one", "/other"}
-        for name, rate in (("one", sender()), ("other", other())):
-            assert found[f"/{name}"]["child"] == "y"
-            assert found[f"/{name}"]["rate"] == pytest.approx(rate, rel=0.15)
-        assert 0 <= found["/one"]["least_delay_s"] < 0.25 <= found["/other"]["least_delay_s"]
-        assert found["/other"]["present"]
+        assert set(rows_by_node) == {"/drive", "/ekf", "/one", "/other"}
+        for name, rate in (("one", sender()), ("other", second_sender())):
+            assert rows_by_node[f"/{name}"]["child"] == "y"
+            assert rows_by_node[f"/{name}"]["rate"] == pytest.approx(rate, rel=0.15)
+        assert (
+            0
+            <= rows_by_node["/one"]["least_delay_s"]
+            < 0.25
+            <= rows_by_node["/other"]["least_delay_s"]
+        )
+        assert rows_by_node["/other"]["present"]
 
     def is_a_chain(seconds: float) -> None:
         done = json.loads(
@@ -56,7 +61,7 @@ def test_each_publisher_is_named_with_rate_and_delay_and_a_chain_has_a_net_delay
         sending("drive", "odom", "base_link", rate=50),
         sending("ekf", "map", "odom", rate=20, late_s=0.25),
         sending("one", "x", "y", rate=50) as sender,
-        sending("other", "x", "y", rate=20, late_s=0.25) as other,
+        sending("other", "x", "y", rate=20, late_s=0.25) as second_sender,
     ):
         at_last(are_named)
         at_last(is_a_chain)
@@ -89,7 +94,7 @@ def test_what_a_slow_start_takes_is_not_taken_from_the_time_of_observation() -> 
         assert any(is_heard() for _ in OBSERVE_S)
 
 
-def test_piped_it_prints_a_table_each_second_and_ends_with_exit_code_0_on_a_signal() -> None:
+def test_a_pipe_gets_a_table_each_second_and_a_signal_ends_it_with_0() -> None:
     command = [sys.executable, "-m", "tfcompose", "monitor", "--every", "0.2"]
     with (
         sending("drive", "odom", "base_link", rate=50),

@@ -134,8 +134,8 @@ def verify(robot: str, seconds: float) -> list[dict[str, Any]]:
     ]
     done = processes.run(command)
     assert "Traceback" not in done.stderr, done.stderr
-    found: list[dict[str, Any]] = json.loads(done.stdout)
-    return found
+    findings: list[dict[str, Any]] = json.loads(done.stdout)
+    return findings
 
 
 def test_what_differs_from_the_plan_is_found_by_the_doctor_and_by_verify(
@@ -145,13 +145,15 @@ def test_what_differs_from_the_plan_is_found_by_the_doctor_and_by_verify(
     for seconds in OBSERVE_S:
         with ThreadPoolExecutor() as both:
             examined = both.submit(doctor, robot, seconds=seconds)
-            found = verify(robot, seconds), examined.result()[1]
-        if all(finds(some, EXPECTED, LATE) for some in found):
+            results = verify(robot, seconds), examined.result()[1]
+        if all(finds(some, EXPECTED, LATE) for some in results):
             break
-    for some in found:
+    for some in results:
         for code, names in EXPECTED.items():
             text = messages_of(some, code)
             assert [name for name in names if name not in text] == [], text
         assert {name["code"] for name in some} <= {*EXPECTED, *LATE}, some
-    at = {name["code"] for name in found[0] if name["line"]}
-    assert at >= EXPECTED.keys() - {"TF803"}, "verify says where the edge stands in the file"
+    located_codes = {name["code"] for name in results[0] if name["line"]}
+    assert located_codes >= EXPECTED.keys() - {"TF803"}, (
+        "verify says where the edge stands in the file"
+    )

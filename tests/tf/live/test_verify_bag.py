@@ -93,10 +93,10 @@ def test_warnings_alone_fail_only_where_they_are_to(tmp_path: Path, robot: str) 
 
 def test_json_is_a_list_of_findings_as_lints(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", RIGHT[1:])
-    [found] = json.loads(
+    [finding] = json.loads(
         tfcompose("verify", robot, "--bag", bag, "--format", "json", code=1).stdout
     )
-    assert (found["code"], found["name"], found["line"]) == ("TF811", "edge_never_seen", 6)
+    assert (finding["code"], finding["name"], finding["line"]) == ("TF811", "edge_never_seen", 6)
 
 
 def test_junit_has_a_case_for_each_edge(tmp_path: Path, robot: str) -> None:
@@ -161,10 +161,13 @@ def test_each_difference_is_reported_of_a_bag_without_a_publisher(
     tmp_path: Path, robot: str, sent: list[Sent], code: str, names: list[str]
 ) -> None:
     bag = write_bag(tmp_path / "bag", sent)
-    [found] = json.loads(
+    [finding] = json.loads(
         tfcompose("verify", robot, "--bag", bag, "--format", "json", code=1).stdout
     )
-    assert (found["code"], [name for name in names if name not in found["message"]]) == (code, [])
+    assert (finding["code"], [name for name in names if name not in finding["message"]]) == (
+        code,
+        [],
+    )
 
 
 def test_wrong_use_and_what_cannot_be_read_is_exit_code_2(tmp_path: Path, robot: str) -> None:
@@ -211,7 +214,7 @@ def test_the_tree_of_a_bag_says_what_is_expected_unexpected_and_missing(
     assert rows[4].endswith("unexpected")
 
 
-def test_the_tree_of_a_file_for_programs_has_the_shape_of_the_published_one(
+def test_the_tree_in_a_json_file_has_the_shape_of_the_published_one(
     tmp_path: Path, robot: str
 ) -> None:
     bag = write_bag(tmp_path / "bag", RIGHT)

@@ -17,14 +17,14 @@ def test_what_ros_wrote_is_read(seconds: int, nanoseconds: int) -> None:
     message.clock.sec, message.clock.nanosec = seconds, nanoseconds
     data = bytes(serialize_message(message))
     assert read_clock(data) == seconds * 1_000_000_000 + nanoseconds
-    other = bytes((0, 0, 0, 0)) + data[4:8][::-1] + data[8:12][::-1]
-    assert read_clock(other) == read_clock(data), "in the other byte order, too"
+    swapped = bytes((0, 0, 0, 0)) + data[4:8][::-1] + data[8:12][::-1]
+    assert read_clock(swapped) == read_clock(data), "in the other byte order, too"
 
 
 @given(st.binary(max_size=40))
 def test_any_bytes_are_a_time_or_none(data: bytes) -> None:
-    found = read_clock(data)
-    assert found is None or abs(found) <= 2**31 * 1_000_000_000
+    time_ns = read_clock(data)
+    assert time_ns is None or abs(time_ns) <= 2**31 * 1_000_000_000
 
 
 @pytest.mark.ros

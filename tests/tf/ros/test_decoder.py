@@ -109,9 +109,9 @@ def test_truncations_and_huge_counts_are_refused_after_a_full_message() -> None:
         huge = data[:4] + struct.pack("<I", count) + data[8:]
         with pytest.raises(ValueError, match="message"):
             decoder.rows(huge)
-        for at in (16, 28) if count > 5 else ():  # the lengths of the first two names
+        for offset in (16, 28) if count > 5 else ():  # the lengths of the first two names
             with pytest.raises(ValueError, match="message"):
-                decoder.rows(data[:at] + struct.pack("<I", count) + data[at + 4 :])
+                decoder.rows(data[:offset] + struct.pack("<I", count) + data[offset + 4 :])
 
 
 def test_a_flood_of_new_layouts_takes_bounded_memory_and_time() -> None:

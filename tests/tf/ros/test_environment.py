@@ -22,10 +22,10 @@ SPACE = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
 
 
 def test_what_the_plan_says_reaches_the_process() -> None:
-    found = child_environment(
-        {"HOME": "/root", "ROS_DOMAIN_ID": "3"}, RosSettings("", 7, "localhost"), own=False
+    environment = child_environment(
+        {"HOME": "/root", "ROS_DOMAIN_ID": "3"}, RosSettings("", 7, "localhost"), is_built_in=False
     )
-    assert found == {
+    assert environment == {
         "HOME": "/root",
         "ROS_DOMAIN_ID": "7",
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -35,26 +35,28 @@ def test_what_the_plan_says_reaches_the_process() -> None:
 
 def test_what_the_plan_leaves_open_stays_as_it_is() -> None:
     base = {"ROS_DOMAIN_ID": "3", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
-    assert child_environment(base, RosSettings(), own=False) == base | {"PYTHONUNBUFFERED": "1"}
+    assert child_environment(base, RosSettings(), is_built_in=False) == base | {
+        "PYTHONUNBUFFERED": "1"
+    }
 
 
 def test_own_processes_announce_themselves_by_the_packaged_profile() -> None:
-    found = child_environment({}, RosSettings(), own=True)
-    assert found["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(FASTDDS_PROFILE)
+    environment = child_environment({}, RosSettings(), is_built_in=True)
+    assert environment["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(FASTDDS_PROFILE)
     for base, ros in (
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, RosSettings()),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, RosSettings(discovery="localhost")),
     ):
-        found = child_environment(base, ros, own=True)
-        assert found["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(FASTDDS_PROFILE_LOCALHOST)
+        environment = child_environment(base, ros, is_built_in=True)
+        assert environment["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(FASTDDS_PROFILE_LOCALHOST)
 
 
 @pytest.mark.parametrize(
     "name", ["FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"]
 )
 def test_a_profile_that_the_user_set_stays(name: str) -> None:
-    found = child_environment({name: "/etc/mine.xml"}, RosSettings(), own=True)
-    assert {key: value for key, value in found.items() if "PROFILES" in key} == {
+    environment = child_environment({name: "/etc/mine.xml"}, RosSettings(), is_built_in=True)
+    assert {key: value for key, value in environment.items() if "PROFILES" in key} == {
         name: "/etc/mine.xml"
     }
 
@@ -63,7 +65,7 @@ def test_a_profile_that_the_user_set_stays(name: str) -> None:
     ("file", "period_ns"),
     [(FASTDDS_PROFILE, 250_000_000), (FASTDDS_PROFILE_LOCALHOST, 100_000_000)],
 )
-def test_the_profile_announces_four_times_a_second_and_on_one_machine_ten_times(
+def test_the_profile_announces_at_4_hz_and_on_one_machine_at_10_hz(
     file: Path, period_ns: int
 ) -> None:
     config = next(ET.parse(file).iter(f"{SPACE}discovery_config"))  # noqa: S314 (a file of ours)
@@ -98,10 +100,10 @@ def test_other_middlewares_get_no_profile_of_fast_dds() -> None:
         (RosSettings(rmw="zenoh"), {}),
         (RosSettings(), {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}),
     ):
-        found = child_environment(base, ros, own=True)
-        assert not [name for name in found if "PROFILES" in name]
+        environment = child_environment(base, ros, is_built_in=True)
+        assert not [name for name in environment if "PROFILES" in name]
     assert child_environment(
-        {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, RosSettings(rmw="fastdds"), own=True
+        {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, RosSettings(rmw="fastdds"), is_built_in=True
     ) == {
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
         "PYTHONUNBUFFERED": "1",
@@ -109,9 +111,9 @@ def test_other_middlewares_get_no_profile_of_fast_dds() -> None:
     }
 
 
-def test_a_middleware_that_is_not_installed_is_named_as_the_robot_file_names_it() -> None:
+def test_a_missing_middleware_is_named_as_in_the_robot_file() -> None:
     ros = RosSettings(rmw="zenoh")
-    finding = ros_trouble(child_environment({}, ros, own=True), ros)
+    finding = ros_trouble(child_environment({}, ros, is_built_in=True), ros)
     assert finding is not None
     assert (finding.code, "rmw: zenoh" in finding.message, "rmw_zenoh_cpp" in finding.message) == (
         "TF901",
@@ -189,6 +191,6 @@ def test_without_a_variable_the_release_is_that_of_rclpy(monkeypatch: pytest.Mon
 
 def test_advice_names_the_packages_of_the_robots_release() -> None:
     ros = RosSettings(rmw="zenoh", distro="kilted")
-    finding = ros_trouble(child_environment({}, ros, own=True), ros)
+    finding = ros_trouble(child_environment({}, ros, is_built_in=True), ros)
     assert finding is not None
     assert "ros-kilted-rmw-zenoh-cpp" in finding.help

@@ -43,11 +43,11 @@ def test_names_positions_and_time_are_read_in_either_byte_order(
 ) -> None:
     positions = [0.5 * n for n in range(len(joints))]
     data = message(joints, positions, frame, order)
-    found = read_names(data)
-    assert found.names == tuple(joints)
-    assert found.fit(data)
-    assert list(positions_of(found, data)) == positions
-    assert found.stamp_ns(data) == 3_000_000_007
+    joint_names = read_names(data)
+    assert joint_names.names == tuple(joints)
+    assert joint_names.fit(data)
+    assert list(positions_of(joint_names, data)) == positions
+    assert joint_names.stamp_ns(data) == 3_000_000_007
 
 
 def test_a_message_of_the_other_byte_order_does_not_fit() -> None:
@@ -64,7 +64,7 @@ def test_what_is_encoded_is_cdr(joints: list[str]) -> None:
 
 @pytest.mark.parametrize(
     ("positions", "why"),
-    [([], "names and no positions"), ([1.0], "another number"), ([1.0] * 3, "another number")],
+    [([], "names and no positions"), ([1.0], "different number"), ([1.0] * 3, "different number")],
 )
 def test_another_number_of_positions_is_refused_with_a_sentence(
     positions: list[float], why: str
@@ -93,10 +93,10 @@ def test_any_bytes_give_names_or_a_value_error(data: bytes) -> None:
             _read(head + data)
 
 
-@pytest.mark.parametrize("at", [12, 20])
-def test_a_message_that_claims_a_lot_is_refused_at_once(at: int) -> None:
+@pytest.mark.parametrize("offset", [12, 20])
+def test_a_message_that_claims_a_lot_is_refused_at_once(offset: int) -> None:
     data = bytearray(message([], []))
-    struct.pack_into("<I", data, at, 0xFFFFFFFF)
+    struct.pack_into("<I", data, offset, 0xFFFFFFFF)
     tracemalloc.start()
     with pytest.raises(ValueError, match="bytes"):
         read_names(bytes(data))
@@ -105,7 +105,7 @@ def test_a_message_that_claims_a_lot_is_refused_at_once(at: int) -> None:
 
 
 def _read(data: bytes) -> JointNames:
-    found = read_names(data)
-    positions_of(found, data)
-    found.stamp_ns(data)
-    return found
+    joint_names = read_names(data)
+    positions_of(joint_names, data)
+    joint_names.stamp_ns(data)
+    return joint_names

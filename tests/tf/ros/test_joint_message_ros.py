@@ -17,10 +17,10 @@ def test_what_ros_writes_is_read(names: list[str], frame: str) -> None:
     message = JointState(name=names, position=positions, velocity=[3.0] * len(names))
     message.header.frame_id, message.header.stamp.sec, message.header.stamp.nanosec = frame, 7, 9
     data = serialize_message(message)
-    found = read_names(data)
-    assert (found.names, found.stamp_ns(data)) == (tuple(names), 7_000_000_009)
-    assert found.fit(data)
-    assert list(positions_of(found, data)) == positions
+    joint_names = read_names(data)
+    assert (joint_names.names, joint_names.stamp_ns(data)) == (tuple(names), 7_000_000_009)
+    assert joint_names.fit(data)
+    assert list(positions_of(joint_names, data)) == positions
 
 
 @pytest.mark.parametrize("names", NAMES, ids=len)

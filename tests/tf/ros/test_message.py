@@ -111,7 +111,7 @@ def test_a_template_gives_the_bytes_of_a_fresh_message(sent: list[SentTransform]
 
 
 def _read_or_refuse(data: bytes) -> None:
-    found: list[SentTransform] = []
+    transforms: list[SentTransform] = []
     with suppress(ValueError):
-        found = decode(data)
-    assert all(isinstance(each, SentTransform) for each in found)
+        transforms = decode(data)
+    assert all(isinstance(each, SentTransform) for each in transforms)

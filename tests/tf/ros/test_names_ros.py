@@ -17,10 +17,10 @@ QOS = SimpleNamespace(
 
 
 class Graph:
-    """A node's graph; ``shown`` are the ids of publishers with namespace and name of the node."""
+    """A node's graph; ``names_by_gid``: namespace and name of each publisher's node."""
 
-    def __init__(self, **shown: tuple[str, str]) -> None:
-        self.shown = shown
+    def __init__(self, **names_by_gid: tuple[str, str]) -> None:
+        self.names_by_gid = names_by_gid
 
     def get_publishers_info_by_topic(self, _topic: str, **_: Any) -> list[SimpleNamespace]:
         return [
@@ -28,7 +28,7 @@ class Graph:
                 endpoint_gid=gid.encode().ljust(16), node_namespace=namespace, node_name=name,
                 qos_profile=QOS, topic_type="tf2_msgs/msg/TFMessage",
             )
-            for gid, (namespace, name) in self.shown.items()
+            for gid, (namespace, name) in self.names_by_gid.items()
         ]  # fmt: skip
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
@@ -54,12 +54,12 @@ def names(node: Any) -> list[str]:
 def test_a_publisher_that_returns_without_a_name_has_the_one_that_it_had(nameless: str) -> None:
     node: Any = Graph(a=("/rover", "static"))
     assert names(node) == ["/rover/static"]
-    node.shown = {}
+    node.names_by_gid = {}
     assert names(node) == []
-    node.shown = {"a": (nameless, nameless), "b": (nameless, nameless)}
+    node.names_by_gid = {"a": (nameless, nameless), "b": (nameless, nameless)}
     assert sorted(names(node)) == sorted(["/rover/static", nameless])
     assert graph.nodes(node) == ["/rover/static"]
-    node.shown = {"a": ("/", "other")}
+    node.names_by_gid = {"a": ("/", "other")}
     assert names(node) == ["/other"], "an id that is used anew"
 
 
@@ -69,8 +69,8 @@ def test_the_names_of_those_that_are_there_outlive_any_number_of_others(
     monkeypatch.setattr(graph, "MOST_NAMES", 3)
     node: Any = Graph()
     for number in range(10):
-        node.shown = {f"n{number}": ("/", "newcomer"), "a": ("/", "static")}
+        node.names_by_gid = {f"n{number}": ("/", "newcomer"), "a": ("/", "static")}
         names(node)
-    node.shown = {"a": (UNKNOWN_NODE, UNKNOWN_NODE)}
+    node.names_by_gid = {"a": (UNKNOWN_NODE, UNKNOWN_NODE)}
     assert names(node) == ["/static"]
     assert len(graph._names) == 3

@@ -36,17 +36,17 @@ def test_a_network_is_an_interface_that_runs_and_has_an_address() -> None:
     [(False, "SUBNET", True), (True, "SUBNET", False), (False, "LOCALHOST", False)],
     ids=["without", "with", "alone"],
 )
-def test_only_who_begins_without_a_network_that_it_needs_is_ended_by_the_first_one(
+def test_the_first_network_ends_only_processes_that_need_it(
     monkeypatch: pytest.MonkeyPatch, *, begins: bool, heard: str, comes: bool
 ) -> None:
     monkeypatch.setenv(RANGE, heard)
     monkeypatch.setattr(network, "CHECK_EVERY_S", 0.01)
-    there = [begins]
-    monkeypatch.setattr(network, "has_network", lambda: there[0])
+    answers = [begins]
+    monkeypatch.setattr(network, "has_network", lambda: answers[0])
     stop = Stop()
     with FirstNetwork(stop) as first:
         assert not stop.wait(0.1)
-        there[0] = True
+        answers[0] = True
         assert until(lambda: first.came, 5.0 if comes else 0.1) is comes
     assert stop.requested is comes
 
@@ -54,10 +54,10 @@ def test_only_who_begins_without_a_network_that_it_needs_is_ended_by_the_first_o
 def test_who_is_ended_otherwise_waits_for_no_network(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(RANGE, raising=False)
     monkeypatch.setattr(network, "CHECK_EVERY_S", 0.01)
-    there = [False]
-    monkeypatch.setattr(network, "has_network", lambda: there[0])
+    answers = [False]
+    monkeypatch.setattr(network, "has_network", lambda: answers[0])
     stop = Stop()
     with FirstNetwork(stop) as first:
         stop.request()
-    there[0] = True
+    answers[0] = True
     assert not until(lambda: first.came, 0.1)

@@ -69,6 +69,6 @@ def test_rcl_reads_the_same_values_from_the_built_file(tmp_path: Path, domain: D
     assert mine["flag"] == "True"
     built = tmp_path / "out" / "params" / "planner.yaml"
     assert read(built) == mine
-    other = ("costmap", "/costmap")
-    assert read(built, *other) == read(tmp_path / "mine.yaml", *other)
-    assert read(built, *other)["radius"] == "0.3"
+    node = ("costmap", "/costmap")
+    assert read(built, *node) == read(tmp_path / "mine.yaml", *node)
+    assert read(built, *node)["radius"] == "0.3"

@@ -32,14 +32,14 @@ print(*sorted(one for one in held if "fastrtps_port" in one))
 
 
 @pytest.mark.parametrize("discovery", ["localhost", "subnet"])
-@pytest.mark.parametrize("own", [True, False])
+@pytest.mark.parametrize("is_built_in", [True, False])
 def test_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
-    domain: object, discovery: Discovery, *, own: bool
+    domain: object, discovery: Discovery, *, is_built_in: bool
 ) -> None:
     assert domain
-    env = child_environment(os.environ, RosSettings(discovery=discovery), own=own)
+    env = child_environment(os.environ, RosSettings(discovery=discovery), is_built_in=is_built_in)
     output = processes.run([sys.executable, "-c", NODE], env=env, check=True)
-    assert (output.stdout == "\n") == own, output.stdout
+    assert (output.stdout == "\n") == is_built_in, output.stdout
 
 
 #: Says how many UDP ports the process takes messages at, before and after it reads outside of
@@ -66,7 +66,7 @@ def test_what_everybody_sends_has_a_port_of_its_own_at_a_strict_guard(domain: ob
     A flood would take what is fenced off with it.
     """
     assert domain
-    env = child_environment(os.environ, RosSettings(discovery="localhost"), own=True)
+    env = child_environment(os.environ, RosSettings(discovery="localhost"), is_built_in=True)
     assert processes.run([sys.executable, "-c", APART], env=env, check=True).stdout == "1\n"
 
 

@@ -20,11 +20,15 @@ def test_a_publishers_process_is_followed_up_to_the_child_of_its_launcher() -> N
     code = "env -i setsid sleep 99 & echo $!; wait"
     with processes.start(["sh", "-c", code], stdout=subprocess.PIPE) as shell:
         assert shell.stdout
-        pid, own, launcher = int(shell.stdout.readline()), gid_of(os.getpid()), os.getpid()
-        assert until(lambda: descent(gid_of(pid), own, launcher)[-1:] == (shell.pid,))
-        assert descent(gid_of(pid), own, launcher)[0] == pid
-        assert descent(gid_of(shell.pid), own, launcher) == (shell.pid,)
-        assert descent(gid_of(pid), own, pid) == ()
-        assert descent(gid_of(pid, b"\x01\x0f\x43\x21"), own, launcher) == (), "of another host"
-        assert descent(gid_of(pid, b"\x01\x10\x12\x34"), own, launcher) == (), "another vendor's"
+        pid, own_gid, launcher = int(shell.stdout.readline()), gid_of(os.getpid()), os.getpid()
+        assert until(lambda: descent(gid_of(pid), own_gid, launcher)[-1:] == (shell.pid,))
+        assert descent(gid_of(pid), own_gid, launcher)[0] == pid
+        assert descent(gid_of(shell.pid), own_gid, launcher) == (shell.pid,)
+        assert descent(gid_of(pid), own_gid, pid) == ()
+        assert descent(gid_of(pid, b"\x01\x0f\x43\x21"), own_gid, launcher) == (), (
+            "of another host"
+        )
+        assert descent(gid_of(pid, b"\x01\x10\x12\x34"), own_gid, launcher) == (), (
+            "another vendor's"
+        )
         processes.end(shell)

@@ -22,8 +22,8 @@ def test_a_process_that_has_only_loaded_ros_is_none_of_its_processes(
     code: str, *, has_joined: bool
 ) -> None:
     command = [sys.executable, "-c", f"import os, sys\n{code}{WAITS}"]
-    with processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
-        assert other.stdout
-        assert other.stdout.readline() == "there\n"
-        assert (other.pid in {pid for pid, _, _ in ros_processes()}) is has_joined
-        processes.end(other)
+    with processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "there\n"
+        assert (process.pid in {pid for pid, _, _ in ros_processes()}) is has_joined
+        processes.end(process)

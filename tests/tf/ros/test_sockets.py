@@ -23,13 +23,13 @@ def send(receiver: socket.socket, number: int) -> None:
 
 def received(receiver: socket.socket) -> int:
     receiver.settimeout(0)
-    found = 0
+    count = 0
     while True:
         try:
             receiver.recv(2000)
         except BlockingIOError:
-            return found
-        found += 1
+            return count
+        count += 1
 
 
 def test_each_datagram_that_a_full_socket_dropped_is_counted_once(receiver: socket.socket) -> None:

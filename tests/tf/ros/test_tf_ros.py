@@ -37,8 +37,10 @@ def test_a_message_and_the_graph_name_the_same_publisher(node: Any) -> None:
         names = ["/rover/one", "/rover/two"]  # known a moment after the messages
         assert until(lambda: [writer.node for writer in writers(node, "/tf_static")] == names)
         named = {writer.gid: writer for writer in writers(node, "/tf_static")}
-        found = {decode(each.data)[0].stamp_ns: named[each.gid or b""].node for each in received}
-    assert found == {0: "/rover/one", 1: "/rover/two"}
+        nodes_by_stamp = {
+            decode(each.data)[0].stamp_ns: named[each.gid or b""].node for each in received
+        }
+    assert nodes_by_stamp == {0: "/rover/one", 1: "/rover/two"}
     assert {writer.durability for writer in named.values()} == {"transient_local"}
     assert {writer.reliability for writer in named.values()} == {"reliable"}
     assert {writer.type for writer in named.values()} == {"tf2_msgs/msg/TFMessage"}
@@ -109,7 +111,7 @@ def test_a_signal_after_the_node_has_ended_does_no_harm(domain: object) -> None:
     assert stop.requested
 
 
-def test_a_node_leaves_no_thread_and_offers_nothing_that_it_does_not_answer(
+def test_a_node_leaves_no_thread_and_offers_no_dead_service(
     domain: object,
 ) -> None:
     assert domain

@@ -13,35 +13,35 @@ from tfcompose.tf.ros.tf_codec import TF_MESSAGE_HASH, SentTransform, encode
 
 
 @pytest.fixture
-def own() -> Any:
+def message_type() -> Any:
     """The own type; its type support is there only as long as it is."""
     return typesupport.own_type()
 
 
-def _address(own: Any) -> int:
-    return typesupport.capsule_address(own.__class__._TYPE_SUPPORT)
+def _address(message_type: Any) -> int:
+    return typesupport.capsule_address(message_type.__class__._TYPE_SUPPORT)
 
 
-def test_the_hash_is_that_of_the_description(own: Any) -> None:
-    address = _address(own)
+def test_the_hash_is_that_of_the_description(message_type: Any) -> None:
+    address = _address(message_type)
     assert typesupport.hash_text(address) == TF_MESSAGE_HASH
     assert typesupport.type_hash(typesupport.description_json(address)) == TF_MESSAGE_HASH
 
 
-def test_the_description_is_that_of_tf_message(own: Any) -> None:
+def test_the_description_is_that_of_tf_message(message_type: Any) -> None:
     gc.collect()
-    found = typesupport.description_json(_address(own))
+    description = typesupport.description_json(_address(message_type))
     kind = {
         "type_id": 145,
         "capacity": 0,
         "string_capacity": 0,
         "nested_type_name": "geometry_msgs/msg/TransformStamped",
     }
-    assert found["type_description"] == {
+    assert description["type_description"] == {
         "type_name": "tf2_msgs/msg/TFMessage",
         "fields": [{"name": "transforms", "type": kind}],
     }
-    assert [each["type_name"] for each in found["referenced_type_descriptions"]] == [
+    assert [each["type_name"] for each in description["referenced_type_descriptions"]] == [
         "builtin_interfaces/msg/Time",
         "geometry_msgs/msg/Quaternion",
         "geometry_msgs/msg/Transform",

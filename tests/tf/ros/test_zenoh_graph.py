@@ -69,9 +69,9 @@ def test_a_token_of_a_publisher_names_node_topic_type_and_qos() -> None:
         .replace("%robot1%tf", "%tf")
         .replace("2:1:", "::")
     )
-    found = publisher_of(at_the_root)
-    assert found is not None
-    assert (found.node, found.topic, found.durability, found.reliability) == (
+    publisher = publisher_of(at_the_root)
+    assert publisher is not None
+    assert (publisher.node, publisher.topic, publisher.durability, publisher.reliability) == (
         "/slam",
         "/tf",
         "volatile",
@@ -210,7 +210,7 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
         (replace(edge("map odom", "slam"), node="/robot1/slam"),),
         (slam,),
     )
-    judge, reader, found = Judge(plan, 0.0, 0.0, 0), MessageReader(), list[FindingShown]()
+    judge, reader, notices = Judge(plan, 0.0, 0.0, 0), MessageReader(), list[FindingShown]()
     judge.tick(0.0)  # the start is over: who is found before has taken the edge
     with ExitStack() as stack:
         opened = open_session(environment_of(peers))
@@ -235,13 +235,13 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
                     )
                     message = reader.read(received, static=False)
                     events += judge.judge_arrival(judge.take(message, now), message, now)
-            found.extend(
+            notices.extend(
                 event for event in [*events, *judge.tick(now)] if isinstance(event, FindingShown)
             )
-            return bool(found)
+            return bool(notices)
 
         assert until(is_found)
-    assert [(event.found.code, "/rogue" in event.found.message) for event in found] == [
+    assert [(event.found.code, "/rogue" in event.found.message) for event in notices] == [
         ("TF801", True)
     ]
 
@@ -277,11 +277,11 @@ def test_monitor_names_publishers_on_zenoh_without_an_installed_rmw_zenoh(
         done.set()
         thread.join()
     assert result.returncode == 0, result.stderr
-    found = {
+    nodes = {
         (edge["parent"], edge["child"], edge["publisher"])
         for edge in json.loads(result.stdout)["edges"]
     }
-    assert found == {
+    assert nodes == {
         ("map", "odom", "/robot1/slam"),
         ("map", "odom", "/rogue"),
         ("base_link", "laser", "/robot1/slam"),

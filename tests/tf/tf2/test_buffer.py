@@ -27,14 +27,14 @@ from tfcompose.tf.tf2.poses import IDENTITY, between, unit
 S = 1_000_000_000
 
 
-def at(x: float, yaw: float = 0.0) -> Pose:
+def pose_at(x: float, yaw: float = 0.0) -> Pose:
     return Pose((x, 0.0, 0.0), quat_from_rpy(0, 0, yaw))
 
 
 def rover() -> Buffer:
     buffer = Buffer()
-    buffer.set("odom", "base_link", at(1.0, math.pi / 2), 5 * S, static=False)
-    buffer.set("base_link", "laser", at(0.3), 0, static=True)
+    buffer.set("odom", "base_link", pose_at(1.0, math.pi / 2), 5 * S, static=False)
+    buffer.set("base_link", "laser", pose_at(0.3), 0, static=True)
     buffer.set("base_link", "camera", Pose((0.2, 0.0, 0.1), OPTICAL_XYZW), 0, static=True)
     return buffer
 
@@ -54,7 +54,7 @@ def test_a_moving_edge_gives_the_pose_its_time() -> None:
 
 def test_the_edge_that_is_behind_is_named() -> None:
     buffer = rover()
-    buffer.set("map", "odom", at(0), 4 * S, static=False)
+    buffer.set("map", "odom", pose_at(0), 4 * S, static=False)
     assert buffer.behind("map", "laser") == "map → odom"
     assert buffer.behind("odom", "laser") == "odom → base_link"
     assert buffer.behind("laser", "camera") is None
@@ -62,8 +62,8 @@ def test_the_edge_that_is_behind_is_named() -> None:
 
 def test_a_leading_slash_is_dropped_as_tf2_does() -> None:
     buffer = rover()
-    buffer.set("/base_link", "/imu", at(0.5), 0, static=True)
-    assert buffer.latest("base_link", "imu")[0] == at(0.5)
+    buffer.set("/base_link", "/imu", pose_at(0.5), 0, static=True)
+    assert buffer.latest("base_link", "imu")[0] == pose_at(0.5)
     with pytest.raises(InvalidArgumentException, match=r'"/base_link" .*base_link'):
         buffer.latest("/base_link", "imu")
 
@@ -94,8 +94,8 @@ def test_random_trees_agree_with_scipy() -> None:
 def test_the_newest_common_time_is_that_of_the_edge_that_is_behind() -> None:
     buffer = Buffer()
     for second in range(4):
-        buffer.set("map", "odom", at(0.1 * second), second * S, static=False)
-        buffer.set("odom", "base", at(float(second)), second * S + S // 2, static=False)
+        buffer.set("map", "odom", pose_at(0.1 * second), second * S, static=False)
+        buffer.set("odom", "base", pose_at(float(second)), second * S + S // 2, static=False)
     pose, stamp = buffer.latest("map", "base")
     assert stamp == 3 * S
     assert pose.xyz[0] == pytest.approx(0.3 + 2.5), (
@@ -108,8 +108,8 @@ def test_rotations_are_interpolated_as_scipy_does() -> None:
     slerp = Slerp([0, 1], Rotation.from_quat([a, b]))
     for part in (0.0, 0.25, 0.5, 0.9, 1.0):
         expected: Quaternion = tuple(slerp(part).as_quat())
-        found = between((0, 0, 0, *a, 0, 0, 0, *b), part)
-        assert angle_between((found[3], found[4], found[5], found[6]), expected) < 1e-12
+        row = between((0, 0, 0, *a, 0, 0, 0, *b), part)
+        assert angle_between((row[3], row[4], row[5], row[6]), expected) < 1e-12
 
 
 def test_interpolation_takes_the_short_way_whatever_the_signs() -> None:
@@ -125,15 +125,15 @@ def test_an_unknown_frame_is_named_with_the_nearest_known() -> None:
 
 def test_two_trees_are_reported_with_their_roots() -> None:
     buffer = rover()
-    buffer.set("world", "table", at(1), 0, static=True)
+    buffer.set("world", "table", pose_at(1), 0, static=True)
     with pytest.raises(ConnectivityException, match=r"odom\b.*\btable\b.*\bodom\b.*\bworld"):
         buffer.latest("odom", "table")
 
 
 def test_edges_without_a_common_time_say_which_and_by_how_much() -> None:
     buffer = Buffer()
-    buffer.set("map", "odom", at(0), 1 * S, static=False)
-    buffer.set("odom", "base", at(0), 3 * S, static=False)
+    buffer.set("map", "odom", pose_at(0), 1 * S, static=False)
+    buffer.set("odom", "base", pose_at(0), 3 * S, static=False)
     with pytest.raises(ExtrapolationException, match=r"odom → base .*2000 ms .*map → odom"):
         buffer.latest("map", "base")
 
@@ -141,13 +141,13 @@ def test_edges_without_a_common_time_say_which_and_by_how_much() -> None:
 def test_a_history_is_ten_seconds_long() -> None:
     buffer = Buffer()
     for second in range(30):
-        buffer.set("odom", "base", at(float(second)), second * S, static=False)
-    assert not buffer.set("odom", "base", at(0), 29 * S - CACHE_NS - 1, static=False)
-    buffer.set("map", "odom", at(0), 20 * S, static=False)
+        buffer.set("odom", "base", pose_at(float(second)), second * S, static=False)
+    assert not buffer.set("odom", "base", pose_at(0), 29 * S - CACHE_NS - 1, static=False)
+    buffer.set("map", "odom", pose_at(0), 20 * S, static=False)
     assert buffer.latest("map", "base")[0].xyz[0] == pytest.approx(20.0)
     early = Buffer()
-    early.set("map", "odom", at(0), 10 * S, static=False)
+    early.set("map", "odom", pose_at(0), 10 * S, static=False)
     for second in range(30):
-        early.set("odom", "base", at(float(second)), second * S, static=False)
+        early.set("odom", "base", pose_at(float(second)), second * S, static=False)
     with pytest.raises(ExtrapolationException):
         early.latest("map", "base")

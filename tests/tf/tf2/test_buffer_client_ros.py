@@ -125,8 +125,8 @@ def client(timeout_padding: Any = 60.0) -> BufferClient:
 
 
 def test_lookups_are_answered_by_the_servers_buffer(server: Server) -> None:
-    found = client().lookup_transform("odom", "laser", Time(seconds=2), Duration(seconds=1.5))
-    assert found == server.buffer.lookup_transform("odom", "laser", Time(seconds=2))
+    stamped = client().lookup_transform("odom", "laser", Time(seconds=2), Duration(seconds=1.5))
+    assert stamped == server.buffer.lookup_transform("odom", "laser", Time(seconds=2))
     assert [
         nanoseconds(time) for time in (server.goals[0].source_time, server.goals[0].timeout)
     ] == [2 * S, 1.5 * S]
@@ -158,7 +158,7 @@ def test_the_servers_error_is_raised_as_tf2s_exception(
 
 
 @pytest.mark.parametrize("step", ["exist", "take", "accept", "answer"])
-def test_a_server_that_does_not_answer_is_waited_for_no_longer_than_allowed(
+def test_an_unresponsive_server_is_awaited_no_longer_than_allowed(
     server: Server, step: str
 ) -> None:
     server.does_not = step

@@ -68,21 +68,21 @@ def test_the_other_way_round_is_the_inverse(
 
 
 @given(poses, poses, st.integers(1, 9 * S), st.data())
-def test_between_two_samples_the_pose_is_between_them_and_near_a_sample_it_is_near_that(
+def test_an_interpolated_pose_lies_between_samples_and_near_the_nearer_one(
     first: Pose, last: Pose, length: int, data: st.DataObject
 ) -> None:
     buffer = Buffer()
     buffer.set("a", "b", first, S, static=False)
     buffer.set("a", "b", last, S + length, static=False)
     since = data.draw(st.integers(0, length))
-    found, _ = buffer.lookup("a", "b", S + since)
+    pose, _ = buffer.lookup("a", "b", S + since)
     part = since / length
-    for p, q, x in zip(first.xyz, last.xyz, found.xyz, strict=True):
+    for p, q, x in zip(first.xyz, last.xyz, pose.xyz, strict=True):
         assert min(p, q) - 1e-9 <= x <= max(p, q) + 1e-9
         assert x == pytest.approx(p + (q - p) * part, abs=1e-9)
     full = angle_between(first.quat_xyzw, last.quat_xyzw)
-    assert angle_between(first.quat_xyzw, found.quat_xyzw) == pytest.approx(full * part, abs=1e-7)
-    assert angle_between(found.quat_xyzw, last.quat_xyzw) == pytest.approx(
+    assert angle_between(first.quat_xyzw, pose.quat_xyzw) == pytest.approx(full * part, abs=1e-7)
+    assert angle_between(pose.quat_xyzw, last.quat_xyzw) == pytest.approx(
         full * (1 - part), abs=1e-7
     )
 
@@ -130,13 +130,13 @@ def test_a_trajectory_is_row_by_row_what_lookup_returns(
     buffer: Buffer, times: list[int], data: st.DataObject
 ) -> None:
     a, b = some(data, buffer), some(data, buffer)
-    found = buffer.lookup_many(a, b, times)
-    assert (found.xyz.shape, found.quat_xyzw.shape) == ((len(times), 3), (len(times), 4))
+    trajectory = buffer.lookup_many(a, b, times)
+    assert (trajectory.xyz.shape, trajectory.quat_xyzw.shape) == ((len(times), 3), (len(times), 4))
     for row, stamp in enumerate(times):
         expected, _ = buffer.lookup(a, b, stamp)
-        assert found.xyz[row] == pytest.approx(expected.xyz, abs=1e-7)
-        assert abs(found.quat_xyzw[row] @ expected.quat_xyzw) == pytest.approx(1, abs=1e-12)
-        assert found.quat_xyzw[row, 3] >= 0
+        assert trajectory.xyz[row] == pytest.approx(expected.xyz, abs=1e-7)
+        assert abs(trajectory.quat_xyzw[row] @ expected.quat_xyzw) == pytest.approx(1, abs=1e-12)
+        assert trajectory.quat_xyzw[row, 3] >= 0
 
 
 @pytest.mark.parametrize("seed", range(20))

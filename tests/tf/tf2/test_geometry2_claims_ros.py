@@ -70,7 +70,7 @@ def test_the_core_prints_its_frames() -> None:
     assert sorted(core(0)._getFrameStrings()) == ["bar", "foo"]
 
 
-def test_setting_a_transform_returns_nothing_and_a_fixed_one_holds_at_any_time() -> None:
+def test_set_transform_returns_nothing_and_a_fixed_one_holds_at_any_time() -> None:
     for seconds, expected in ((0.5, 0), (0, 1)):
         buffer = core()
         assert buffer.set_transform(stamped("bar", "foo", 0), "unittest") is None  # type: ignore[func-returns-value]
@@ -148,7 +148,7 @@ def test_a_velocity_around_the_epoch_begins_there() -> None:
 @pytest.mark.parametrize(
     ("time", "interval"), [(0, 4), (2, 4), (1, 2), (1, 4), (0.5, 3), (0, 9), (4, 8)]
 )
-def test_a_velocity_whose_interval_begins_at_the_epoch_or_before_it_is_what_it_is(
+def test_a_velocity_over_an_interval_from_the_epoch_or_before_is_correct(
     time: float, interval: float
 ) -> None:
     """Time 0 is no time for an end of the interval: it would be the newest."""
@@ -241,8 +241,8 @@ def test_what_broadcasters_send_a_listener_in_the_same_node_hears(node: Any) -> 
     fixed.sendTransform(stamped("foo", "lamp", 1.1))
     fixed.sendTransform(item for item in [stamped("foo", "sign", 1.1)])
     assert until(lambda: heard("lamp", "sign"))
-    found = buffer.lookup_transform("foo", "lamp", Time(seconds=1.5).to_msg())
-    assert (found.header.stamp, found.transform) == (
+    result = buffer.lookup_transform("foo", "lamp", Time(seconds=1.5).to_msg())
+    assert (result.header.stamp, result.transform) == (
         Time(seconds=1.5).to_msg(),
         stamped("foo", "lamp", 0).transform,
     )
@@ -251,7 +251,7 @@ def test_what_broadcasters_send_a_listener_in_the_same_node_hears(node: Any) -> 
 
 
 @pytest.mark.ros
-def test_fixed_transforms_of_several_calls_come_to_a_late_listener_and_the_first_of_a_frame_stays(
+def test_a_late_listener_gets_all_fixed_transforms_and_the_first_per_frame(
     node: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """As in tf2_ros's Python; C++ takes the last."""
@@ -301,8 +301,8 @@ def headed(message: Any) -> Any:
 
 def test_points_and_poses_are_taken_to_another_frame() -> None:
     buffer = half_way_round()
-    found = buffer.lookup_transform("a", "b", Time(seconds=2).to_msg(), Duration(seconds=2))
-    assert (found.transform.translation.x, found.transform.rotation.x) == (1, 1)
+    stamped = buffer.lookup_transform("a", "b", Time(seconds=2).to_msg(), Duration(seconds=2))
+    assert (stamped.transform.translation.x, stamped.transform.rotation.x) == (1, 1)
     point = headed(PointStamped())
     point.point.x, point.point.y, point.point.z = 1.0, 2.0, 3.0
     moved = buffer.transform(point, "b", new_type=PointStamped).point
@@ -310,8 +310,8 @@ def test_points_and_poses_are_taken_to_another_frame() -> None:
     pose = headed(PoseStamped())
     pose.pose.position = point.point
     pose.pose.orientation = Quaternion(w=0.0, x=1.0, y=0.0, z=0.0)
-    at = buffer.transform(pose, "b").pose.position
-    assert (at.x, at.y, at.z) == (0, -2, -3)
+    position = buffer.transform(pose, "b").pose.position
+    assert (position.x, position.y, position.z) == (0, -2, -3)
 
 
 def test_a_covariance_is_turned_and_a_vector_is_not_moved() -> None:
@@ -323,8 +323,16 @@ def test_a_covariance_is_turned_and_a_vector_is_not_moved() -> None:
     pose.pose.pose.position.x, pose.pose.pose.position.y, pose.pose.pose.position.z = 1.0, 2.0, 3.0
     pose.pose.pose.orientation = half.transform.rotation
     moved = tf2_geometry_msgs.do_transform_pose_with_covariance_stamped(pose, half)
-    at, rotation = moved.pose.pose.position, moved.pose.pose.orientation
-    assert (at.x, at.y, at.z, rotation.x, rotation.y, rotation.z, rotation.w) == (
+    position, rotation = moved.pose.pose.position, moved.pose.pose.orientation
+    assert (
+        position.x,
+        position.y,
+        position.z,
+        rotation.x,
+        rotation.y,
+        rotation.z,
+        rotation.w,
+    ) == (
         2,
         0,
         0,

@@ -147,11 +147,11 @@ def test_programs_that_send_transforms_serve_those_that_use_them(
     ]
     with TransformListener(buffer := Buffer()):
         assert until(lambda: bool(buffer.can_transform("odom", "laser_link", Time())))
-        found = buffer.lookup_transform("odom", "laser_link", Time()).transform.translation
-    assert (found.x**2 + found.y**2, found.z) == pytest.approx((1.0, 0.3))
+        translation = buffer.lookup_transform("odom", "laser_link", Time()).transform.translation
+    assert (translation.x**2 + translation.y**2, translation.z) == pytest.approx((1.0, 0.3))
 
 
-def test_a_program_that_sends_a_cameras_frames_serves_one_that_moves_its_clouds(
+def test_a_sender_of_camera_frames_serves_a_program_that_moves_its_clouds(
     running: Callable[..., None], outputs: Callable[..., list[list[str]]]
 ) -> None:
     running("camera", "--ros-args", "-p", "camera_pitch:=1.5707963267948966")
@@ -165,24 +165,24 @@ def encoded(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_li
 
 
 @pytest.fixture
-def other(domain: object) -> Iterator[Any]:
+def talker(domain: object) -> Iterator[Any]:
     assert domain
     with open_node("talks", "/test") as opened:
         yield opened
 
 
-def test_a_listener_without_a_node_hears_a_namespace_from_its_own_thread(other: Any) -> None:
+def test_a_listener_without_a_node_hears_a_namespace_from_its_own_thread(talker: Any) -> None:
     before, buffer, profile = threading.enumerate(), Buffer(), cast("Any", QoSProfile)
     requested = {"qos": profile(depth=7, reliability=2), "static_qos": 5}  # best effort
     with TransformListener(buffer, namespace="robot1", **requested) as listener:
-        publisher = TFPublisher(other, static=True, topic="/robot1/tf_static")
+        publisher = TFPublisher(talker, static=True, topic="/robot1/tf_static")
         publisher.publish(encoded(0.5, 0))
-        found = buffer.lookup_transform("odom", "base_link", 0, timeout=60 * S)
-        assert found.transform.translation.x == 0.5
-        assert [writer.node for writer in writers(other, "/robot1/tf_static")] == ["/test/talks"]
-        own = listener._ros.node
+        stamped = buffer.lookup_transform("odom", "base_link", 0, timeout=60 * S)
+        assert stamped.transform.translation.x == 0.5
+        assert [writer.node for writer in writers(talker, "/robot1/tf_static")] == ["/test/talks"]
+        own_node = listener._ros.node
         moving, fixed = (
-            own.get_subscriptions_info_by_topic(f"/robot1/{name}")[0].qos_profile
+            own_node.get_subscriptions_info_by_topic(f"/robot1/{name}")[0].qos_profile
             for name in ("tf", "tf_static")
         )
     assert moving.reliability.name == "BEST_EFFORT"
@@ -190,12 +190,12 @@ def test_a_listener_without_a_node_hears_a_namespace_from_its_own_thread(other: 
     assert none_but(before), "the listener's thread has ended"
 
 
-def test_an_executor_spins_until_the_transform_is_there(node: Any, other: Any) -> None:
+def test_an_executor_spins_until_the_transform_is_there(node: Any, talker: Any) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, node)
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
-    moving, fixed = TFPublisher(other, static=False), TFPublisher(other, static=True)
+    moving, fixed = TFPublisher(talker, static=False), TFPublisher(talker, static=True)
     assert until(lambda: moving.publisher.get_subscription_count() == 1)
     future = buffer.wait_for_transform_async("odom", "laser", Time(seconds=5))
     executor.spin_until_future_complete(future, timeout_sec=0.2)
@@ -204,30 +204,30 @@ def test_an_executor_spins_until_the_transform_is_there(node: Any, other: Any) -
     for stamp in (4, 6):
         moving.publish(encoded(float(stamp), stamp * S))
     executor.spin_until_future_complete(future, timeout_sec=60)
-    found = future.result()
-    assert type(found).__module__.startswith("geometry_msgs")
-    assert (found.transform.translation.x, found.header.stamp.sec) == (5.5, 5)
+    stamped = future.result()
+    assert type(stamped).__module__.startswith("geometry_msgs")
+    assert (stamped.transform.translation.x, stamped.header.stamp.sec) == (5.5, 5)
     listener.close()
     listener.close()
     executor.shutdown()
 
 
 def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(
-    node: Any, other: Any
+    node: Any, talker: Any
 ) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, node)
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
-    found: list[float] = []
+    xs: list[float] = []
 
     async def on_timer() -> None:
         timer.cancel()
         transform = await buffer.lookup_transform_async("odom", "base_link", Time(seconds=5))
-        found.append(transform.transform.translation.x)
+        xs.append(transform.transform.translation.x)
 
     timer = node.create_timer(0.01, on_timer)
-    publisher = TFPublisher(other, static=False)
+    publisher = TFPublisher(talker, static=False)
     assert until(lambda: publisher.publisher.get_subscription_count() == 1)
 
     def requested() -> bool:
@@ -240,27 +240,27 @@ def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(
 
     def answered() -> bool:
         executor.spin_once(timeout_sec=0.05)
-        return bool(found)
+        return bool(xs)
 
     assert until(answered)
-    assert found == [1.5]
+    assert xs == [1.5]
     listener.close()
     executor.shutdown()
 
 
-def test_a_listener_of_its_own_follows_the_simulated_clock_and_says_when_it_goes_back(
-    other: Any, capfd: pytest.CaptureFixture[str]
+def test_a_private_listener_follows_simulated_time_and_reports_jumps_back(
+    talker: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     buffer = Buffer()
-    clock = other.create_publisher(Clock, "/clock", 1)
-    publisher = TFPublisher(other, static=False)
+    clock = talker.create_publisher(Clock, "/clock", 1)
+    publisher = TFPublisher(talker, static=False)
 
     with TransformListener(buffer, use_sim_time=True) as listener:
-        own = listener._ros.node.get_clock()
+        own_clock = listener._ros.node.get_clock()
 
         def at(seconds: int) -> bool:
             clock.publish(Clock(clock=Time(seconds=seconds).to_msg()))
-            return bool(own.now().nanoseconds == seconds * S)
+            return bool(own_clock.now().nanoseconds == seconds * S)
 
         assert until(lambda: publisher.publisher.get_subscription_count() == 1)
         assert until(lambda: at(100))
@@ -276,13 +276,13 @@ def test_a_listener_of_its_own_follows_the_simulated_clock_and_says_when_it_goes
 
 
 def test_a_thread_of_the_listeners_spins_the_entire_node_and_ends_with_it(
-    node: Any, other: Any
+    node: Any, talker: Any
 ) -> None:
     before, ticks = threading.enumerate(), []
     node.create_timer(0.01, lambda: ticks.append(1))
     buffer = Buffer()
     with TransformListener(buffer, node, spin_thread=True):
-        publisher = TFPublisher(other, static=False)
+        publisher = TFPublisher(talker, static=False)
         assert until(lambda: publisher.publisher.get_subscription_count() == 1)
         publisher.publish(encoded(1.0, S))
         assert (
@@ -293,13 +293,11 @@ def test_a_thread_of_the_listeners_spins_the_entire_node_and_ends_with_it(
     assert none_but(before)
 
 
-def test_a_wait_of_half_a_second_ends_after_half_a_second_and_callbacks_of_tf_are_heard_meanwhile(
-    node: Any, other: Any
-) -> None:
+def test_a_wait_ends_after_half_a_second_and_lets_tf_callbacks_run(node: Any, talker: Any) -> None:
     """The thread that waits is the only one, and nobody spins."""
     buffer = Buffer()
     with TransformListener(buffer, node):
-        publisher = TFPublisher(other, static=False)
+        publisher = TFPublisher(talker, static=False)
         assert until(lambda: publisher.publisher.get_subscription_count() == 1)
         timer = threading.Timer(0.1, lambda: publisher.publish(encoded(3.0, 9 * S)))
         timer.start()

@@ -46,7 +46,7 @@ class StandInNode:
     def get_logger(self) -> Any:
         return SimpleNamespace(warning=self.logged.append)
 
-    def at(self, seconds: float) -> None:
+    def set_time(self, seconds: float) -> None:
         """Set its clock, as /clock does where its parameter use_sim_time is set."""
         self.clock._set_ros_time_is_active(True)  # noqa: FBT003 (rclpy's)
         self.clock.set_ros_time_override(Time(seconds=seconds, clock_type=self.clock.clock_type))
@@ -85,8 +85,8 @@ def test_a_listener_to_fixed_edges_alone_has_one_subscription(node: StandInNode)
     listener = TransformListener(buffer, node, static_only=True)
     assert node.callbacks.keys() == {"/tf_static"}
     node.callbacks["/tf_static"](encoded(0.5, 0, "base_link", "laser"))
-    found = listener.buffer.lookup_transform("base_link", "laser", 0)
-    assert found.transform.translation.x == 0.5
+    stamped = listener.buffer.lookup_transform("base_link", "laser", 0)
+    assert stamped.transform.translation.x == 0.5
 
 
 def test_malformed_messages_and_refused_transforms_are_reported_once(node: StandInNode) -> None:
@@ -111,14 +111,14 @@ def test_when_the_clock_goes_back_moving_edges_are_forgotten_once(
     node: StandInNode, *, both: bool
 ) -> None:
     """Programs of tf2_ros name the node to the buffer, to the listener, or to both."""
-    node.at(100)
+    node.set_time(100)
     buffer = Buffer(node=node) if both else Buffer()
     listener = TransformListener(buffer, node)
     node.callbacks["/tf"](encoded(1.0, 100 * S))
     node.callbacks["/tf_static"](encoded(0.5, 0, "base_link", "laser"))
-    node.at(101)
+    node.set_time(101)
     assert buffer.can_transform("odom", "laser", Time())
-    node.at(5)
+    node.set_time(5)
     assert not buffer.can_transform("odom", "laser", Time())
     assert buffer.can_transform("base_link", "laser", Time())
     assert [line.split(":")[0] for line in node.logged] == ["time went back by 96.000 s"]
@@ -127,9 +127,7 @@ def test_when_the_clock_goes_back_moving_edges_are_forgotten_once(
     listener.close()
 
 
-def test_a_wait_ends_when_the_transform_comes_or_when_the_time_is_over_and_not_much_later() -> (
-    None
-):
+def test_a_wait_ends_at_the_transform_or_soon_after_the_timeout() -> None:
     buffer = Buffer()
     timer = threading.Timer(0.2, lambda: buffer.set("odom", "base_link", Pose(), S, static=False))
     begun = time.monotonic()

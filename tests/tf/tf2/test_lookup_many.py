@@ -62,18 +62,18 @@ def test_times_that_an_edge_does_not_know_raise_or_are_rows_of_nan() -> None:
     stamps = [100 * S, 99 * S, 110 * S, 109 * S]
     with pytest.raises(ExtrapolationException, match=r"odom → base at 99.* 1000 ms .* 2 of 4 "):
         buffer.lookup_many("odom", "laser", stamps)
-    found = buffer.lookup_many("odom", "laser", stamps, outside="nan")
-    assert np.isnan(found.xyz[:, 0]).tolist() == [False, True, True, False]
-    assert np.isnan(found.quat_xyzw).any(axis=1).tolist() == [False, True, True, False]
-    assert found.xyz[3].tolist() == [9.0, 0.0, 0.3]
+    trajectory = buffer.lookup_many("odom", "laser", stamps, outside="nan")
+    assert np.isnan(trajectory.xyz[:, 0]).tolist() == [False, True, True, False]
+    assert np.isnan(trajectory.quat_xyzw).any(axis=1).tolist() == [False, True, True, False]
+    assert trajectory.xyz[3].tolist() == [9.0, 0.0, 0.3]
 
 
 def test_an_edge_with_one_sample_is_known_at_its_time() -> None:
     buffer = Buffer()
     buffer.set("a", "b", Pose((1, 2, 3)), 5 * S, static=False)
-    found = buffer.lookup_many("a", "b", [4 * S, 5 * S, 6 * S], outside="nan")
-    assert np.isnan(found.xyz[:, 0]).tolist() == [True, False, True]
-    assert found.xyz[1].tolist() == [1, 2, 3]
+    trajectory = buffer.lookup_many("a", "b", [4 * S, 5 * S, 6 * S], outside="nan")
+    assert np.isnan(trajectory.xyz[:, 0]).tolist() == [True, False, True]
+    assert trajectory.xyz[1].tolist() == [1, 2, 3]
 
 
 def test_two_samples_of_one_time_count_as_in_a_single_lookup() -> None:
@@ -96,9 +96,9 @@ def test_a_frame_that_changed_its_parent_is_followed() -> None:
     buffer.set("world", "table", Pose((10, 0, 0)), 0, static=True)
     buffer.set("world", "hand", Pose((20, 0, 0)), 0, static=True)
     stamps = [S, 3 * S // 2, 5 * S // 2, 3 * S, 7 * S // 2, 5 * S]
-    found = buffer.lookup_many("world", "cup", stamps, outside="nan")
-    assert found.xyz[:5, 0].tolist() == [11.0, 11.5, 12.0, 25.0, 25.5]
-    assert np.isnan(found.xyz[5]).all()
+    trajectory = buffer.lookup_many("world", "cup", stamps, outside="nan")
+    assert trajectory.xyz[:5, 0].tolist() == [11.0, 11.5, 12.0, 25.0, 25.5]
+    assert np.isnan(trajectory.xyz[5]).all()
 
 
 def test_fixed_edges_and_a_frame_in_itself_fill_all_rows() -> None:

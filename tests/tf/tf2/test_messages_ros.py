@@ -62,11 +62,14 @@ def of(place: Any, names: str = "xyz") -> list[float]:
 def moved(buffer: Buffer, message: Any) -> Any:
     """Return the moved message as it comes out of a publisher and into a subscription."""
     before = repr(message)
-    found = buffer.transform(message, "base", timeout=Duration(seconds=0.1))
+    transformed = buffer.transform(message, "base", timeout=Duration(seconds=0.1))
     assert repr(message) == before, "what was given is left alone"
-    assert type(found) is type(message)
-    assert (found.header.frame_id, found.header.stamp) == ("base", message.header.stamp)
-    return deserialize_message(serialize_message(found), type(message))
+    assert type(transformed) is type(message)
+    assert (transformed.header.frame_id, transformed.header.stamp) == (
+        "base",
+        message.header.stamp,
+    )
+    return deserialize_message(serialize_message(transformed), type(message))
 
 
 def test_points_vectors_and_corners(buffer: Buffer) -> None:
@@ -87,15 +90,17 @@ def test_poses_and_their_covariances(buffer: Buffer) -> None:
     rotation = Rotation.from_euler("xyz", (0.3, -0.2, 2.0))
     spread = np.random.default_rng(4).normal(size=(6, 6))
     covariance = spread @ spread.T
-    pose, known = headed(PoseStamped), headed(PoseWithCovarianceStamped)
-    known.pose.covariance = covariance.reshape(-1)
-    for place in (pose.pose, known.pose.pose):
+    pose, with_covariance = headed(PoseStamped), headed(PoseWithCovarianceStamped)
+    with_covariance.pose.covariance = covariance.reshape(-1)
+    for place in (pose.pose, with_covariance.pose.pose):
         put(place.position, GIVEN)
         put(place.orientation, rotation.as_quat())
     both = np.kron(np.eye(2), ROTATION.as_matrix())
-    found = moved(buffer, known).pose
-    assert np.array(found.covariance).reshape(6, 6) == pytest.approx(both @ covariance @ both.T)
-    for each in (moved(buffer, pose).pose, found.pose):
+    moved_pose = moved(buffer, with_covariance).pose
+    assert np.array(moved_pose.covariance).reshape(6, 6) == pytest.approx(
+        both @ covariance @ both.T
+    )
+    for each in (moved(buffer, pose).pose, moved_pose.pose):
         assert of(each.position) == pytest.approx(ROTATION.apply(GIVEN) + XYZ)
         assert (
             Rotation.from_quat(of(each.orientation, "xyzw")).inv() * ROTATION * rotation
@@ -125,8 +130,8 @@ def test_an_organised_cloud_with_holes_and_colours(buffer: Buffer) -> None:
         for name in ("x", "y", "z", "rgb")
     ]
     cloud.data = b"".join(row.tobytes() + b"gap here" for row in points)
-    found = moved(buffer, cloud)
-    rows = bytes(found.data)
+    moved_cloud = moved(buffer, cloud)
+    rows = bytes(moved_cloud.data)
     read = np.array([np.frombuffer(rows, kind, 5, row * cloud.row_step) for row in range(3)])
     expected = (
         ROTATION.apply(np.stack([points[n] for n in "xyz"], axis=-1).reshape(-1, 3).astype(float))
@@ -138,14 +143,14 @@ def test_an_organised_cloud_with_holes_and_colours(buffer: Buffer) -> None:
     assert np.isnan(read["x"]).sum() == 1
     assert (read["rgb"] == points["rgb"]).all()
     assert [rows[row * cloud.row_step + 160 :][:8] for row in range(3)] == [b"gap here"] * 3
-    assert (found.fields, found.row_step, found.is_dense) == (
+    assert (moved_cloud.fields, moved_cloud.row_step, moved_cloud.is_dense) == (
         cloud.fields,
         cloud.row_step,
         cloud.is_dense,
     )
 
 
-def test_a_message_becomes_one_of_another_type_only_where_that_means_something(
+def test_a_message_is_converted_to_another_type_only_if_meaningful(
     buffer: Buffer,
 ) -> None:
     point = headed(PointStamped)
@@ -158,6 +163,6 @@ def test_a_message_goes_to_another_time_through_a_frame_that_stands(buffer: Buff
     for second in (1, 9):
         buffer.set("odom", "base", Pose((float(second), 0.0, 0.0)), second * S, static=False)
     point = headed(PointStamped)
-    found = buffer.transform_full(point, "base", Time(seconds=6), "odom")
-    assert of(found.point) == pytest.approx([XYZ[0] - 2 + 5e-9, *XYZ[1:]])
-    assert found.header.stamp.sec == 6
+    moved_point = buffer.transform_full(point, "base", Time(seconds=6), "odom")
+    assert of(moved_point.point) == pytest.approx([XYZ[0] - 2 + 5e-9, *XYZ[1:]])
+    assert moved_point.header.stamp.sec == 6

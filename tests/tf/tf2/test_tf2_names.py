@@ -147,17 +147,17 @@ def test_the_buffer_and_the_listener_are_made_as_tf2s_are() -> None:
 
 
 def test_what_is_exported_has_the_names_of_tf2_ros() -> None:
-    wanted = (
+    expected = (
         "Buffer BufferClient BufferCore BufferInterface StaticTransformBroadcaster"
         " TransformBroadcaster TransformListener TransformRegistration ConvertRegistration Stamped"
         " convert"
     )
-    wanted += (
+    expected += (
         " TypeException NotImplementedException TransformException ConnectivityException"
         " LookupException"
     )
-    wanted += " ExtrapolationException InvalidArgumentException TimeoutException"
-    assert set(wanted.split()) <= set(tf2.__all__)
+    expected += " ExtrapolationException InvalidArgumentException TimeoutException"
+    assert set(expected.split()) <= set(tf2.__all__)
 
 
 def rover() -> Buffer:
@@ -189,7 +189,7 @@ def test_the_core_calls_answer_as_the_others_do() -> None:
     assert dot.endswith("}")
 
 
-def test_a_future_is_done_at_once_when_the_transform_is_there_and_else_when_it_comes() -> None:
+def test_a_future_is_done_once_the_transform_is_available() -> None:
     buffer = rover()
     assert (
         buffer.wait_for_transform_async("odom", "laser", Time(2)).result(0).transform.translation.x
@@ -205,7 +205,7 @@ def test_a_future_is_done_at_once_when_the_transform_is_there_and_else_when_it_c
     assert not buffer.on_insert, "nothing is waited for any longer"
 
 
-def test_a_future_that_is_given_up_is_forgotten_and_a_name_that_cannot_be_ends_it() -> None:
+def test_a_cancelled_future_is_forgotten_and_an_invalid_name_ends_it() -> None:
     buffer = rover()
     assert buffer.wait_for_transform_async("odom", "arm", Time()).cancel()
     assert not buffer.on_insert
@@ -223,9 +223,9 @@ def test_a_coroutine_waits_and_the_loop_goes_on_meanwhile() -> None:
         timer.start()
         simple = buffer.lookup_transform_async("odom", "laser", Time(4))
         full = buffer.lookup_transform_full_async("base", Time(3), "laser", Time(5), "odom")
-        found = await asyncio.wait_for(asyncio.gather(simple, full), 60)
+        answers = await asyncio.wait_for(asyncio.gather(simple, full), 60)
         timer.join()
-        return found[0], found[1]
+        return answers[0], answers[1]
 
     simple, full = asyncio.run(both())
     assert (simple.transform.translation.x, full.transform.translation.x) == (4.0, 2.0)
@@ -272,7 +272,7 @@ def moved_reading(reading: Reading, transform: Any) -> Reading:
     return Reading(transform.header, reading.range_m + transform.transform.translation.x)
 
 
-def test_types_of_ones_own_are_moved_and_turned_into_others_once_they_are_registered() -> None:
+def test_registered_types_of_users_are_transformed_and_converted() -> None:
     buffer = rover()
     with pytest.raises(TypeException, match=r"Reading\b.*\bPointStamped"):
         buffer.transform(Reading(Header(Time(2), "base"), 1.0), "odom")
@@ -369,7 +369,7 @@ def test_the_velocity_of_what_goes_in_a_circle_is_that_of_the_book() -> None:
     assert back.angular == pytest.approx((0.0, 0.0, -0.5), abs=1e-9)
 
 
-def test_the_velocity_of_a_point_on_what_rotates_about_any_axis_is_the_cross_product() -> None:
+def test_the_velocity_of_a_rotating_point_is_the_cross_product() -> None:
     omega, drift, arm = (
         np.array([0.3, -0.7, 0.4]),
         np.array([0.5, 0.2, -0.1]),
@@ -417,7 +417,7 @@ def test_tools_print_how_long_and_how_new_what_is_kept_is() -> None:
         assert part in dot
 
 
-def test_a_velocity_is_a_mean_around_the_time_and_at_the_newest_one_up_to_it() -> None:
+def test_a_velocity_is_a_mean_around_the_time_and_up_to_the_newest_one() -> None:
     buffer = Buffer()
     for second, x in ((1, 0.0), (2, 1.0), (3, 3.0), (4, 3.0)):
         buffer.set("odom", "base", Pose((x, 0.0, 0.0)), second * S, static=False)
@@ -448,7 +448,7 @@ def test_half_a_rotation_within_the_interval_goes_the_short_way() -> None:
     assert angular == pytest.approx((0, 0, 2 * np.pi - 6.0))
 
 
-def test_who_waits_for_a_frame_that_is_not_there_costs_little_in_a_tree_of_thousands() -> None:
+def test_waiting_for_an_absent_frame_costs_little_in_a_tree_of_thousands() -> None:
     """The nearest name is looked for when somebody reads the message, and not at every attempt."""
     buffer = Buffer()
     for index in range(2000):

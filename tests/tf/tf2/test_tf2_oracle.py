@@ -71,12 +71,12 @@ class Pair:
 
     def _both(self, name: str, requested: tuple[Any, ...]) -> None:
         try:
-            found = getattr(self.ours, name)(*requested)
+            answer = getattr(self.ours, name)(*requested)
         except TransformException as error:
             with pytest.raises(getattr(tf2, type(error).__name__)):
                 getattr(self.theirs, name)(*requested)
             return
-        same(found, getattr(self.theirs, name)(*requested))
+        same(answer, getattr(self.theirs, name)(*requested))
 
 
 def same(ours: Any, theirs: Any) -> None:

@@ -55,8 +55,12 @@ def ask(buffer: Buffer, what: str, given: list[Any]) -> Any:
         return type(error).__name__
 
 
-def packed(found: Any) -> list[float]:
-    to, rotated, stamp = found.transform.translation, found.transform.rotation, found.header.stamp
+def packed(stamped: Any) -> list[float]:
+    to, rotated, stamp = (
+        stamped.transform.translation,
+        stamped.transform.rotation,
+        stamped.header.stamp,
+    )
     return [
         stamp.sec * S + stamp.nanosec,
         to.x,
@@ -131,12 +135,12 @@ def record() -> None:
             )
         times = [Time(nanoseconds=each) if isinstance(each, int) else each for each in given]
         try:
-            found = packed(
+            numbers = packed(
                 getattr(buffer, f"{what}_core".replace("lookup", "lookup_transform"))(*times)
             )
         except tf2.TransformException as error:
             return type(error).__name__
-        return [round(number, 6) for number in found]
+        return [round(number, 6) for number in numbers]
 
     lines = []
     for seed in range(HISTORIES):

@@ -32,7 +32,7 @@ S = 1_000_000_000
 MS = 1_000_000
 
 
-def at(x: float) -> Pose:
+def pose_at(x: float) -> Pose:
     return Pose((x, 0.0, 0.0))
 
 
@@ -40,13 +40,13 @@ def moving(*samples: tuple[str, str, float, float]) -> Buffer:
     """Return a buffer that has taken (parent, child, x, seconds) in order."""
     buffer = Buffer()
     for parent, child, x, seconds in samples:
-        buffer.set(parent, child, at(x), round(seconds * S), static=False)
+        buffer.set(parent, child, pose_at(x), round(seconds * S), static=False)
     return buffer
 
 
 def x_of(buffer: Buffer, target: str, source: str, seconds: float = 0.0) -> float:
-    found: float = buffer.lookup(target, source, round(seconds * S))[0].xyz[0]
-    return found
+    x: float = buffer.lookup(target, source, round(seconds * S))[0].xyz[0]
+    return x
 
 
 @pytest.mark.parametrize(
@@ -82,20 +82,20 @@ def test_a_quaternion_a_little_off_is_brought_to_length_1() -> None:
     buffer = Buffer()
     assert buffer.set("a", "b", Pose((0, 0, 0), (0, 0, 0.6, 0.803)), S, static=False)
     assert math.hypot(*buffer.lookup("a", "b")[0].quat_xyzw) == pytest.approx(1, abs=1e-15)
-    buffer.set("b", "c", at(100), 0, static=True)
+    buffer.set("b", "c", pose_at(100), 0, static=True)
     assert math.hypot(*buffer.lookup("a", "c")[0].xyz) == pytest.approx(100, abs=1e-12), (
         "turning does not stretch"
     )
 
 
-def test_data_older_than_the_cache_is_refused_and_the_rest_of_the_message_is_taken() -> None:
+def test_data_older_than_the_cache_is_refused_and_the_rest_is_taken() -> None:
     buffer = moving(("odom", "base", 0.0, 100.0))
     rows: list[Any] = [
         ("odom", "base", 89, 999_999_999, *[0.0] * 6, 1.0),
         ("odom", "arm", 1, 0, *[0.0] * 6, 1.0),
     ]
     assert buffer.insert(rows, static=False) == [("base", Rejection.OLD)]
-    assert buffer.set("odom", "base", at(1), 90 * S, static=False), (
+    assert buffer.set("odom", "base", pose_at(1), 90 * S, static=False), (
         "exactly as old as the cache is not too old"
     )
     assert buffer.frames == {"odom", "base", "arm"}
@@ -107,7 +107,7 @@ def test_samples_are_dropped_by_the_newest_before_the_one_that_comes() -> None:
         ("odom", "base", 0.0, 1.0), ("odom", "base", 1.0, 2.0), ("odom", "base", 2.0, 50.0)
     )
     assert x_of(buffer, "odom", "base", 1.5) == 0.5
-    buffer.set("odom", "base", at(3), 51 * S, static=False)
+    buffer.set("odom", "base", pose_at(3), 51 * S, static=False)
     with pytest.raises(ExtrapolationException, match=r"past.* 48500 ms"):
         buffer.lookup("odom", "base", round(1.5 * S))
 
@@ -126,7 +126,7 @@ def test_outside_the_samples_it_says_which_edge_and_how_many_milliseconds(
     seconds: float, why: str
 ) -> None:
     buffer = moving(("odom", "base", 1.0, 1.0), ("odom", "base", 3.0, 3.0))
-    buffer.set("base", "laser", at(0.1), 0, static=True)
+    buffer.set("base", "laser", pose_at(0.1), 0, static=True)
     with pytest.raises(ExtrapolationException, match=why):
         buffer.lookup("odom", "laser", round(seconds * S))
     answer, reason = buffer.can_transform(
@@ -147,17 +147,17 @@ def test_one_sample_is_good_at_its_own_time_and_as_the_newest() -> None:
 def test_a_fixed_edge_is_good_at_any_time_and_its_newest_value_counts() -> None:
     buffer = Buffer()
     for x in (1.0, 2.0):
-        buffer.set("base", "laser", at(x), 7 * S, static=True)
+        buffer.set("base", "laser", pose_at(x), 7 * S, static=True)
     assert [x_of(buffer, "base", "laser", second) for second in (0.0, 1.0, 1e6)] == [2.0, 2.0, 2.0]
     assert buffer.lookup("base", "laser")[1] == 0
     assert buffer.lookup("base", "laser", 9)[1] == 9
 
 
-def test_an_edge_that_becomes_fixed_loses_its_samples_and_the_other_way_round() -> None:
+def test_an_edge_loses_its_samples_if_it_becomes_fixed_or_dynamic() -> None:
     buffer = moving(("a", "b", 1.0, 1.0), ("a", "b", 2.0, 2.0))
-    buffer.set("a", "b", at(9), 0, static=True)
+    buffer.set("a", "b", pose_at(9), 0, static=True)
     assert x_of(buffer, "a", "b", 1.0) == 9.0
-    buffer.set("a", "b", at(3), 3 * S, static=False)
+    buffer.set("a", "b", pose_at(3), 3 * S, static=False)
     with pytest.raises(ExtrapolationException):
         buffer.lookup("a", "b", 1 * S)
     assert x_of(buffer, "a", "b") == 3.0
@@ -167,8 +167,8 @@ def test_a_frame_hangs_where_its_samples_hung_at_that_time() -> None:
     buffer = moving(
         ("table", "cup", 1.0, 1.0), ("table", "cup", 2.0, 2.0), ("hand", "cup", 0.5, 3.0)
     )
-    buffer.set("world", "table", at(10), 0, static=True)
-    buffer.set("world", "hand", at(20), 0, static=True)
+    buffer.set("world", "table", pose_at(10), 0, static=True)
+    buffer.set("world", "hand", pose_at(20), 0, static=True)
     assert x_of(buffer, "world", "cup") == 20.5
     assert x_of(buffer, "world", "cup", 1.5) == 11.5
     assert x_of(buffer, "world", "cup", 2.5) == 12.0, (
@@ -176,21 +176,21 @@ def test_a_frame_hangs_where_its_samples_hung_at_that_time() -> None:
     )
     assert x_of(buffer, "table", "cup", 2.5) == 2.0
     for second in (4.0, 14.0):
-        buffer.set("hand", "cup", at(0.5), round(second * S), static=False)
+        buffer.set("hand", "cup", pose_at(0.5), round(second * S), static=False)
     assert x_of(buffer, "world", "cup", 3.5) == 20.5
 
 
-def test_an_older_sample_of_another_parent_does_not_change_where_the_frame_hangs_now() -> None:
+def test_an_older_sample_of_another_parent_does_not_move_the_frame() -> None:
     buffer = moving(
         ("odom", "base", 1.0, 2.0), ("map", "base", 2.0, 3.0), ("utm", "base", 3.0, 1.0)
     )
-    assert buffer.lookup("map", "base") == (at(2), 3 * S)
+    assert buffer.lookup("map", "base") == (pose_at(2), 3 * S)
     assert {"utm", "odom"} <= buffer.frames
     with pytest.raises(ConnectivityException, match=r"utm\b.*\bbase\b"):
         buffer.lookup("utm", "base")
 
 
-def test_of_two_samples_of_one_time_the_last_counts_but_at_the_oldest_time_the_first() -> None:
+def test_of_two_equal_stamps_the_last_counts_but_at_the_oldest_the_first() -> None:
     buffer = moving(
         ("a", "b", 1.0, 1.0), ("a", "b", 2.0, 1.0), ("a", "b", 5.0, 2.0), ("a", "b", 6.0, 2.0)
     )
@@ -203,12 +203,12 @@ def test_the_newest_common_time_passes_by_fixed_edges_and_time_zero() -> None:
     buffer = moving(
         ("map", "odom", 0.0, 4.0), ("odom", "base", 0.0, 3.0), ("odom", "base", 0.0, 4.5)
     )
-    buffer.set("base", "laser", at(0.1), 99 * S, static=True)
+    buffer.set("base", "laser", pose_at(0.1), 99 * S, static=True)
     assert buffer.lookup("map", "laser")[1] == 4 * S
     assert buffer.get_latest_common_time("map", "laser").nanoseconds == 4 * S
     assert buffer.get_latest_common_time("base", "laser").nanoseconds == 0
     assert buffer.get_latest_common_time("base", "base").nanoseconds == 4.5 * S
-    buffer.set("laser", "mirror", at(0.1), 0, static=False)
+    buffer.set("laser", "mirror", pose_at(0.1), 0, static=False)
     assert buffer.get_latest_common_time("map", "mirror").nanoseconds == 4 * S
     assert buffer.get_latest_common_time("laser", "mirror").nanoseconds == 0
     assert x_of(buffer, "laser", "mirror") == 0.1
@@ -233,7 +233,7 @@ def test_a_frame_in_itself_needs_no_data() -> None:
 
 def test_between_two_times_the_fixed_frame_stands_still() -> None:
     buffer = moving(*[("odom", "base", float(second), float(second)) for second in range(1, 6)])
-    buffer.set("base", "laser", at(0.5), 0, static=True)
+    buffer.set("base", "laser", pose_at(0.5), 0, static=True)
     moved = buffer.lookup_transform_full("base", 5 * S, "laser", 2 * S, "odom")
     assert moved.transform.translation.x == pytest.approx(-2.5), "the robot has gone 3 m since"
     assert (moved.header.stamp.sec, moved.header.frame_id, moved.child_frame_id) == (
@@ -264,14 +264,19 @@ def test_between_two_times_rotations_count_in_the_order_of_the_frames() -> None:
     buffer.set(
         "base", "laser", Pose((1.0, 0.0, 0.0), quat_from_rpy(0, math.pi / 2, 0)), 0, static=True
     )
-    found = buffer.lookup_transform_full("laser", 2 * S, "base", S, "odom").transform
+    transform = buffer.lookup_transform_full("laser", 2 * S, "base", S, "odom").transform
     expected = buffer.lookup("laser", "odom", 2 * S)[0] @ buffer.lookup("odom", "base", S)[0]
-    xyz = found.translation.x, found.translation.y, found.translation.z
+    xyz = transform.translation.x, transform.translation.y, transform.translation.z
     assert xyz == pytest.approx(expected.xyz, abs=1e-12)
-    rotated = found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w
+    rotated = (
+        transform.rotation.x,
+        transform.rotation.y,
+        transform.rotation.z,
+        transform.rotation.w,
+    )
     assert angle_between(rotated, expected.quat_xyzw) < 1e-12
-    other = buffer.lookup("odom", "base", S)[0] @ buffer.lookup("laser", "odom", 2 * S)[0]
-    assert angle_between(rotated, other.quat_xyzw) > 0.5, (
+    reversed_pose = buffer.lookup("odom", "base", S)[0] @ buffer.lookup("laser", "odom", 2 * S)[0]
+    assert angle_between(rotated, reversed_pose.quat_xyzw) > 0.5, (
         "in the other order it would be another rotation"
     )
 
@@ -280,11 +285,11 @@ def test_a_sample_that_comes_again_is_not_the_last_of_its_time() -> None:
     """tf2 keeps all samples of a time, and takes none twice."""
     buffer = moving(*(("odom", "base", x, 5.0) for x in (1.0, 2.0, 3.0, 2.0)))
     assert x_of(buffer, "odom", "base") == 3.0
-    buffer.set("odom", "base", at(4.0), 7 * S, static=False)
+    buffer.set("odom", "base", pose_at(4.0), 7 * S, static=False)
     assert x_of(buffer, "odom", "base", 5.0) == 1.0, "at the oldest time of all the first counts"
     assert x_of(buffer, "odom", "base", 6.0) == 3.5
-    buffer.set("map", "base", at(2.0), 7 * S, static=False)
-    buffer.set("odom", "base", at(4.0), 7 * S, static=False)
+    buffer.set("map", "base", pose_at(2.0), 7 * S, static=False)
+    buffer.set("odom", "base", pose_at(4.0), 7 * S, static=False)
     assert x_of(buffer, "map", "base") == 2.0
 
 
@@ -298,7 +303,7 @@ def test_samples_that_came_at_an_expired_time_are_forgotten() -> None:
 
 def test_clear_forgets_what_moves_and_keeps_what_is_fixed_and_the_names() -> None:
     buffer = moving(("odom", "base", 1.0, 5.0))
-    buffer.set("base", "laser", at(0.1), 0, static=True)
+    buffer.set("base", "laser", pose_at(0.1), 0, static=True)
     assert x_of(buffer, "odom", "laser") == 1.1
     buffer.clear()
     assert buffer.frames == {"odom", "base", "laser"}
@@ -307,16 +312,16 @@ def test_clear_forgets_what_moves_and_keeps_what_is_fixed_and_the_names() -> Non
         buffer.lookup("odom", "laser")
     with pytest.raises(ExtrapolationException, match="base "):
         buffer.lookup("odom", "laser", 5 * S)
-    assert buffer.set("odom", "base", at(2), 1 * S, static=False), (
+    assert buffer.set("odom", "base", pose_at(2), 1 * S, static=False), (
         "after a jump back nothing is too old"
     )
     assert x_of(buffer, "odom", "base") == 2.0
 
 
-def test_in_a_loop_what_is_directly_above_is_found_and_the_rest_is_a_lookup_exception() -> None:
+def test_in_a_loop_a_parent_is_found_and_the_rest_raises_lookup_exception() -> None:
     buffer = Buffer()
     for parent, child in (("a", "b"), ("b", "c"), ("c", "a"), ("a", "tool")):
-        buffer.set(parent, child, at(1), 0, static=True)
+        buffer.set(parent, child, pose_at(1), 0, static=True)
     assert x_of(buffer, "a", "c") == 2.0
     for stamp in (0, S):
         with pytest.raises(LookupException, match="b → c → a → b"):
@@ -326,7 +331,7 @@ def test_in_a_loop_what_is_directly_above_is_found_and_the_rest_is_a_lookup_exce
 def test_a_chain_of_two_thousand_edges_is_no_loop() -> None:
     buffer = Buffer()
     for index in range(2000):
-        buffer.set(f"f{index}", f"f{index + 1}", at(1), 0, static=True)
+        buffer.set(f"f{index}", f"f{index + 1}", pose_at(1), 0, static=True)
     assert x_of(buffer, "f0", "f2000") == 2000.0
 
 
@@ -347,13 +352,13 @@ def test_messages_and_times_are_taken_by_what_they_have() -> None:
         "2 s are kept, no older one taken"
     )
     buffer.set_transform_static(TransformStamped(Header(Time(), "base"), "laser"), "urdf")
-    found = buffer.lookup_transform("odom", "laser", Time(5, 0), timeout=Duration())
-    assert (found.header.stamp.sec, found.header.stamp.nanosec, found.header.frame_id) == (
+    result = buffer.lookup_transform("odom", "laser", Time(5, 0), timeout=Duration())
+    assert (result.header.stamp.sec, result.header.stamp.nanosec, result.header.frame_id) == (
         5,
         0,
         "odom",
     )
-    assert (found.transform.translation.x, found.child_frame_id) == (4.5, "laser")
+    assert (result.transform.translation.x, result.child_frame_id) == (4.5, "laser")
     with pytest.raises(TypeError, match="is not a time"):
         buffer.lookup_transform("odom", "laser", "now")
     with pytest.raises(TypeError, match="is not a time"):
@@ -367,7 +372,7 @@ def test_a_time_far_from_the_epoch_keeps_its_nanoseconds() -> None:
     base = 1_795_244_326_447_640_343
     buffer = Buffer()
     for index in range(2):
-        buffer.set("odom", "base", at(float(index)), base + 4 * index, static=False)
+        buffer.set("odom", "base", pose_at(float(index)), base + 4 * index, static=False)
     assert [buffer.lookup("odom", "base", base + ns)[0].xyz[0] for ns in range(5)] == [
         0,
         0.25,
@@ -381,7 +386,7 @@ def test_a_time_far_from_the_epoch_keeps_its_nanoseconds() -> None:
 
 def test_all_frames_says_what_is_kept_of_each() -> None:
     buffer = moving(("odom", "base", 0.0, 1.0), ("odom", "base", 0.0, 3.0))
-    buffer.set("base", "laser", at(0.1), 9 * S, static=True, authority="urdf")
+    buffer.set("base", "laser", pose_at(0.1), 9 * S, static=True, authority="urdf")
     base, odom, laser = buffer.all_frames()
     assert (base.name, base.parent, base.static, base.samples) == ("base", "odom", False, 2)
     assert (base.oldest_ns, base.newest_ns) == (S, 3 * S)

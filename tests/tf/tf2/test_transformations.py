@@ -72,8 +72,10 @@ def test_quaternions_are_multiplied_inverted_and_interpolated() -> None:
     assert tf.quaternion_conjugate((1, 2, 3, 4)).tolist() == [-1, -2, -3, 4]
     way = Slerp([0, 1], Rotation.concatenate([a, b]))
     for fraction in (0.0, 0.3, 1.0):
-        for other in (b.as_quat(), -b.as_quat()):
-            assert away(tf.quaternion_slerp(a.as_quat(), other, fraction), way(fraction)) < 1e-9
+        for quat_xyzw in (b.as_quat(), -b.as_quat()):
+            assert (
+                away(tf.quaternion_slerp(a.as_quat(), quat_xyzw, fraction), way(fraction)) < 1e-9
+            )
     assert tf.quaternion_slerp((0, 0, 0, 2), (0, 0, 0, 1), 0.5).tolist() == [0, 0, 0, 1]
     long_way = tf.quaternion_slerp((0, 0, 0, 1), (0, 0, -0.6, -0.8), 0.5, shortestpath=False)
     assert away(long_way, Rotation.from_rotvec((0, 0, np.arctan2(0.6, 0.8) - np.pi))) < 1e-9

@@ -135,8 +135,8 @@ def test_every_corner_of_a_polygon_is_moved() -> None:
     corners = [(0.5, -1.0, 2.0), (0.0, 0.0, 0.0), (3.0, 4.0, 5.0)]
     given = PolygonStamped(header(), Polygon([Vector3(*corner) for corner in corners]))
     moved = laser().transform(given, "base")
-    found = [(corner.x, corner.y, corner.z) for corner in moved.polygon.points]
-    assert found == pytest.approx(ROTATION.apply(corners) + XYZ)
+    points = [(corner.x, corner.y, corner.z) for corner in moved.polygon.points]
+    assert points == pytest.approx(ROTATION.apply(corners) + XYZ)
     assert (given.polygon.points[0].x, moved.header.frame_id) == (0.5, "base")
 
 
@@ -149,8 +149,10 @@ def test_a_pose_is_the_product_of_poses(quat: tuple[float, float, float, float])
         .transform(PoseStamped(header(), Placed(Vector3(1, 2, 3), Quaternion(*quat))), "base")
         .pose
     )
-    at, rotation = moved.position, moved.orientation
-    assert (at.x, at.y, at.z) == pytest.approx(tuple(ROTATION.apply([1, 2, 3]) + XYZ))
+    position, rotation = moved.position, moved.orientation
+    assert (position.x, position.y, position.z) == pytest.approx(
+        tuple(ROTATION.apply([1, 2, 3]) + XYZ)
+    )
     expected = ROTATION * (Rotation.from_quat(quat) if any(quat) else Rotation.identity())
     assert (
         Rotation.from_quat([rotation.x, rotation.y, rotation.z, rotation.w]).inv() * expected
@@ -235,11 +237,11 @@ class Layout:
             for name in ("intensity", "ring", "rgb")[: self.rng.randrange(4)]
         ]
         self.rng.shuffle(kinds)
-        at = self.rng.randrange(5)
+        offset = self.rng.randrange(5)
         for name, datatype in kinds:
-            self.fields.append(PointField(name, at, datatype))
-            at += SIZES[datatype] + self.rng.choice([0, 0, 3, 4])
-        self.point_step = at + self.rng.randrange(9)
+            self.fields.append(PointField(name, offset, datatype))
+            offset += SIZES[datatype] + self.rng.choice([0, 0, 3, 4])
+        self.point_step = offset + self.rng.randrange(9)
         self.height, self.width = self.rng.choice([(1, 7), (3, 5), (4, 1), (1, 0), (0, 0)])
         self.row_step = self.width * self.point_step + (
             self.rng.randrange(9) if self.height > 1 else 0
@@ -248,9 +250,9 @@ class Layout:
 
     def cloud(self) -> PointCloud2:
         data = bytearray(self.rng.randbytes(self.row_step * self.height))
-        for _, at, code in self.places():
+        for _, offset, code in self.places():
             value = float("nan") if self.rng.random() < 0.1 else self.rng.uniform(-9, 9)
-            struct.pack_into(code, data, at, value)
+            struct.pack_into(code, data, offset, value)
         names = [
             PointField(each.name, each.offset, each.datatype, each.count) for each in self.fields
         ]
@@ -295,10 +297,14 @@ def test_a_cloud_of_any_layout_is_moved_and_every_other_byte_stays(seed: int) ->
     coordinates: set[int] = set()
     places = layout.places()
     for x, y, z in zip(places[::3], places[1::3], places[2::3], strict=True):
-        point = [struct.unpack_from(code, before, at)[0] for _, at, code in (x, y, z)]
-        found = [struct.unpack_from(code, after, at)[0] for _, at, code in (x, y, z)]
-        assert found == pytest.approx((ROTATION.apply([point]) + XYZ)[0], abs=1e-5, nan_ok=True)
-        coordinates |= {at + i for _, at, code in (x, y, z) for i in range(struct.calcsize(code))}
+        point = [struct.unpack_from(code, before, offset)[0] for _, offset, code in (x, y, z)]
+        moved_point = [struct.unpack_from(code, after, offset)[0] for _, offset, code in (x, y, z)]
+        assert moved_point == pytest.approx(
+            (ROTATION.apply([point]) + XYZ)[0], abs=1e-5, nan_ok=True
+        )
+        coordinates |= {
+            offset + i for _, offset, code in (x, y, z) for i in range(struct.calcsize(code))
+        }
     assert all(
         a == b for i, (a, b) in enumerate(zip(before, after, strict=True)) if i not in coordinates
     )
@@ -342,7 +348,7 @@ def test_a_cloud_that_is_not_what_it_claims_is_refused(changes: dict[str, Any], 
         laser().transform(xyz_cloud(**changes), "base")
 
 
-def test_a_flat_cloud_may_leave_its_row_step_out_and_its_data_may_be_a_list() -> None:
+def test_a_flat_cloud_may_omit_its_row_step_and_its_data_may_be_a_list() -> None:
     data = list(struct.pack("<6f", 1, 2, 3, 4, 5, 6))
     transform = laser().lookup_transform("base", "laser", 0)
     moved = do_transform_cloud(xyz_cloud(row_step=0, data=data), transform)

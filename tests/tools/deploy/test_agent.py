@@ -77,9 +77,9 @@ def test_the_last_releases_are_kept_and_links_lead_to_them(
         agent.settle()
         names.append(made.name)
     assert (agent._release("current"), agent._release("previous")) == (names[-1], names[-2])
-    there = {folder.name for folder in (agent.base / "releases").iterdir()}
-    assert len(there) == KEPT
-    assert there <= set(names)
+    releases = {folder.name for folder in (agent.base / "releases").iterdir()}
+    assert len(releases) == KEPT
+    assert releases <= set(names)
     agent.trial = {"active": False, "before": names[-2]}
     monkeypatch.setattr(agent, "_systemctl", lambda *_: None)
     assert agent.back() == {"release": names[-2], "active": False}
@@ -88,30 +88,30 @@ def test_the_last_releases_are_kept_and_links_lead_to_them(
 
 def test_a_lock_is_held_until_its_process_ends(agent: Agent) -> None:
     assert agent.take_lock("ann") == {"holder": None}
-    other = Agent(SETTINGS | {"system": False}, threading.Event())
-    assert other.take_lock("ben")["holder"].startswith("ann, since ")
+    second = Agent(SETTINGS | {"system": False}, threading.Event())
+    assert second.take_lock("ben")["holder"].startswith("ann, since ")
     assert agent.lock is not None
     os.close(agent.lock)
-    assert other.take_lock("ben") == {"holder": None}
+    assert second.take_lock("ben") == {"holder": None}
 
 
 def test_a_unit_that_was_restarted_long_ago_has_not_failed(
     agent: Agent, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shown = {"ActiveState": "active", "NRestarts": "3", "MainPID": "7"}
-    monkeypatch.setattr(agent, "_show_unit", lambda: shown)
+    unit_state = {"ActiveState": "active", "NRestarts": "3", "MainPID": "7"}
+    monkeypatch.setattr(agent, "_show_unit", lambda: unit_state)
     monkeypatch.setattr(agent, "_journal", lambda: ["last words"])
     assert agent.state()["failed"] is False
-    shown["NRestarts"] = "4"
+    unit_state["NRestarts"] = "4"
     status = agent.wait(10)
     assert (status["failed"], status["lines"]) == (True, ["last words"])
 
 
-def test_a_trial_that_nobody_ended_is_reported_and_the_release_of_a_launcher_is_kept(
+def test_an_unfinished_trial_is_reported_and_a_launchers_release_is_kept(
     agent: Agent, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shown = {"ActiveState": "active"}
-    monkeypatch.setattr(agent, "_show_unit", lambda: shown)
+    unit_state = {"ActiveState": "active"}
+    monkeypatch.setattr(agent, "_show_unit", lambda: unit_state)
     monkeypatch.setattr(agent, "_must", lambda *_: None)
     monkeypatch.setattr(
         agent, "_tfcompose", lambda words, _: subprocess.CompletedProcess(words, 0, "", "")
@@ -126,16 +126,16 @@ def test_a_trial_that_nobody_ended_is_reported_and_the_release_of_a_launcher_is_
             launcher = processes.start(
                 [sys.executable, "-c", "input()", str(plan)], stdin=subprocess.PIPE
             )
-            shown["MainPID"] = str(launcher.pid)
+            unit_state["MainPID"] = str(launcher.pid)
             assert until(lambda: agent._launched_folder() == plan.parent)  # noqa: B023 (at once)
         assert agent.follow(made.name, "brain") == "nothing restarts"
         assert agent.state()["unsettled"]
         agent.commit(made.name)
         agent.settle()
         assert not agent.state()["unsettled"]
-    there = {folder.name for folder in (agent.base / "releases").iterdir()}
-    assert {names[0], names[-1], names[-2]} <= there, "processes use its files"
-    assert len(there) == KEPT
+    releases = {folder.name for folder in (agent.base / "releases").iterdir()}
+    assert {names[0], names[-1], names[-2]} <= releases, "processes use its files"
+    assert len(releases) == KEPT
 
 
 @pytest.mark.parametrize("version", ["(3, 9)", "(3, 12)"])

@@ -1,6 +1,7 @@
 """deploy, on three computers with an sshd of their own: what comes to all of them, or to none."""
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -113,7 +114,7 @@ def journals(computers: Computers) -> str:
     )
 
 
-def test_from_nothing_every_edge_of_every_host_is_live_and_a_second_run_changes_nothing(
+def test_from_nothing_all_hosts_go_live_and_a_second_run_changes_nothing(
     computers: Computers,
 ) -> None:
     checked = deploy(computers, ROBOT, "--check")
@@ -181,11 +182,11 @@ def test_only_what_is_different_starts_again(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     launchers = {name: runs(computers, name) for name in NAMES}
     before = {name: children(computers, name) for name in NAMES}
-    other = ROBOT.replace(
+    changed = ROBOT.replace(
         "rear_drive: {simulate: {fixed: {xyz: [0, 0, 1]}",
         "rear_drive: {simulate: {fixed: {xyz: [0, 0, 2]}",
     )
-    done = deploy(computers, other)
+    done = deploy(computers, changed)
     assert done.returncode == 0, done
     assert {
         "rear: restarted: rear_drive",
@@ -199,18 +200,18 @@ def test_only_what_is_different_starts_again(computers: Computers) -> None:
         for process in before[name]
         if before[name][process] != after[name][process]
     ] == [("rear", "rear_drive")]
-    moved = deploy(computers, other.replace("[0, 0, 0.3]", "[0, 0, 0.4]"))
+    moved = deploy(computers, changed.replace("[0, 0, 0.3]", "[0, 0, 0.4]"))
     assert (moved.returncode, "arm: restarted: guard" in moved.stdout) == (0, True), moved
     assert children(computers, "rear")["rear_drive"] == after["rear"]["rear_drive"]
     assert {name: runs(computers, name) for name in NAMES} == launchers
     assert is_complete(computers)
     assert (
-        deploy(computers, other.replace("[0, 0, 0.3]", "[0, 0, 0.4]"), "--check").returncode == 0
+        deploy(computers, changed.replace("[0, 0, 0.3]", "[0, 0, 0.4]"), "--check").returncode == 0
     )
     named = computers.folder / "robot/meshes/wheel.stl"
     named.write_bytes(b"\1" * 84)
     try:
-        assert deploy(computers, other).returncode == 0
+        assert deploy(computers, changed).returncode == 0
     finally:
         named.write_bytes(b"\0" * 84)
     anew = {name for name in NAMES if runs(computers, name) != launchers[name]}
@@ -414,6 +415,26 @@ def test_a_robot_of_a_fleet_shares_its_edges_from_the_host_of_static(computers: 
     assert "no router at tcp/10.77.0.1:7447" in logs, logs
     assert deploy(computers, ROBOT).returncode == 0
     assert "fleet_share" not in children(computers, "brain")
+
+
+def test_a_release_has_the_overlay_of_the_computer_that_runs_static(
+    computers: Computers,
+) -> None:
+    """All computers of the test have this one's hostname."""
+    folder = computers.folder / "robot/units"
+    folder.mkdir()
+    own_overlay = folder / f"{os.uname().nodename}.yaml"
+    own_overlay.write_text("frames: {lidar: {xyz: [0, 0, 0.302]}}\n")
+    (folder / "ant.yaml").write_text("frames: {lidar: {xyz: [0, 0, 1]}}\n")
+    text = f"{ROBOT}overlays: {{by: hostname, folder: units}}\n"
+    done = deploy(computers, text)
+    assert done.returncode == 0, done
+    assert os.uname().nodename in done.stdout
+    for options, overlay in (((), own_overlay.name), (("--robot", "ant"), "ant.yaml")):
+        done = deploy(computers, text, *options)
+        assert done.returncode == 0, done
+        plan = computers.computers["brain"].base / "rover.brain/current/plan.json"
+        assert json.loads(plan.read_text())["overlays"] == [f"units/{overlay}"]
 
 
 def test_one_host_alone_is_deployed_to_and_waited_for(computers: Computers) -> None:

@@ -33,7 +33,7 @@ OTHER = ROBOT.replace("xyz: [0, 0, 1]", "xyz: [0, 0, 2]")
         (*(f"{text}guard: {{on_violation: stop}}\n" for text in (ROBOT, OTHER)), False),
     ],
 )
-def test_a_robot_goes_on_unless_something_moves_vanishes_or_is_of_all_nodes(
+def test_a_robot_goes_on_unless_an_edge_moves_vanishes_or_all_nodes_change(
     before: str, after: str, *, can: bool
 ) -> None:
     assert can_follow(compiled_plan(before), compiled_plan(after)) is can
@@ -56,7 +56,7 @@ def test_a_host_whose_launcher_can_follow_is_not_stopped(*, edited: bool) -> Non
         rollout = rollout_to(*hosts)
         await rollout.compare(release_of())
         for share, host in zip(rollout.shares, hosts, strict=True):
-            files = share.wanted.manifest | (
+            files = share.new_release.manifest | (
                 {"plan.json": "edited"} if edited and host.name == "main" else {}
             )
             has = {
@@ -66,7 +66,7 @@ def test_a_host_whose_launcher_can_follow_is_not_stopped(*, edited: bool) -> Non
                 "robot": RUNNING,
                 "failed": False,
             }
-            assert name_of(share.wanted.manifest) == share.goal
+            assert name_of(share.new_release.manifest) == share.goal
             host.answers |= {
                 "state": STATE | has,
                 "texts": {"plan.json": text},

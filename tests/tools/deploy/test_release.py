@@ -72,9 +72,11 @@ def unpacked(made: Release, folder: Path) -> Path:
 
 def test_files_are_with_what_they_name_and_every_address_leads_to_them(folder: Path) -> None:
     made = release()
-    there = unpacked(made, folder / "there")
+    unpacked_folder = unpacked(made, folder / "there")
     assert {
-        path.relative_to(there).as_posix() for path in there.rglob("*") if path.is_file()
+        path.relative_to(unpacked_folder).as_posix()
+        for path in unpacked_folder.rglob("*")
+        if path.is_file()
     } == made.manifest.keys()
     copied = {path for path in made.manifest if path.startswith("files/")}
     assert {Path(path).name for path in copied} == {
@@ -84,15 +86,15 @@ def test_files_are_with_what_they_name_and_every_address_leads_to_them(folder: P
         "office.pgm",
     }
     for description in ("robot.state_publisher.urdf", "robot.urdf"):
-        (mesh,) = re.findall(r'filename="([^"]+)"', (there / description).read_text())
-        assert (there / mesh).is_file()
-        assert (there / mesh).parent.joinpath("textures/rubber.png").is_file()
-    process = read_plan((there / "plan.json").read_text(), "plan.json").process("map")
+        (mesh,) = re.findall(r'filename="([^"]+)"', (unpacked_folder / description).read_text())
+        assert (unpacked_folder / mesh).is_file()
+        assert (unpacked_folder / mesh).parent.joinpath("textures/rubber.png").is_file()
+    process = read_plan((unpacked_folder / "plan.json").read_text(), "plan.json").process("map")
     assert process.cwd
     (map_file,) = [word for word in process.argv if word.endswith(".yaml")]
     for named in (process.cwd, map_file.removeprefix("map:=")):
         assert named.startswith("${build_dir}/files/")
-        assert Path(named.replace("${build_dir}", str(there))).exists(), named
+        assert Path(named.replace("${build_dir}", str(unpacked_folder))).exists(), named
 
 
 def test_its_name_is_that_of_the_content_wherever_it_is_built(
@@ -153,8 +155,10 @@ def test_the_fleet_of_a_robot_is_carried_with_it(folder: Path) -> None:
     (folder / "fleets").mkdir()
     (folder / "fleets/warehouse.yaml").write_text(fleet)
     made = release(ROBOT.replace("robot: rover", "robot: rover\nfleet: ../fleets/warehouse.yaml"))
-    there = unpacked(made, folder / "there")
-    share = read_plan((there / "plan.json").read_text(), "plan.json").process("fleet_share")
-    file = share.argv[-1].replace("${build_dir}", str(there))
+    unpacked_folder = unpacked(made, folder / "there")
+    share = read_plan((unpacked_folder / "plan.json").read_text(), "plan.json").process(
+        "fleet_share"
+    )
+    file = share.argv[-1].replace("${build_dir}", str(unpacked_folder))
     assert Path(file).read_text() == fleet
     assert (share.host, share.argv[-2]) == ("brain", "rover")

@@ -55,7 +55,7 @@ def test_a_robot_without_hosts_or_with_a_process_on_none_is_not_deployed() -> No
     expect(refused.value.findings[0], "TF819", "jetsn", "jetson")
 
 
-def test_all_hosts_stop_before_any_starts_and_keep_the_release_once_all_are_live() -> None:
+def test_all_hosts_stop_before_any_starts_and_keep_a_live_release() -> None:
     order: list[str] = []
     main, jetson = StandInHost("main", requests=order), StandInHost("jetson", requests=order)
     released(main, jetson)
@@ -76,7 +76,11 @@ def test_a_host_that_runs_the_release_goes_on() -> None:
         rollout = rollout_to(main, jetson)
         await rollout.compare(release_of())
         share = rollout.shares[0]
-        same = {"release": share.goal, "files": share.wanted.manifest, "unit": share.unit.text()}
+        same = {
+            "release": share.goal,
+            "files": share.new_release.manifest,
+            "unit": share.unit.text(),
+        }
         main.answers["state"] = STATE | STATUS | same
         await rollout.compare(release_of())
         changes = rollout.changes()

@@ -90,19 +90,19 @@ def test_every_link_leads_to_a_file_and_an_anchor_of_the_site(
             if target.scheme or target.netloc:
                 broken.append(f"{file.relative_to(site)} is not alone: {address}")
                 continue
-            there = (file.parent / target.path).resolve() if target.path else file
-            anchors = pages[there].anchors if there in pages else []
-            if not there.is_file() or (target.fragment and target.fragment not in anchors):
+            linked_file = (file.parent / target.path).resolve() if target.path else file
+            anchors = pages[linked_file].anchors if linked_file in pages else []
+            if not linked_file.is_file() or (target.fragment and target.fragment not in anchors):
                 broken.append(f"{file.relative_to(site)}: {address}")
     assert not broken
 
 
 def test_pages_of_codes_follow_each_other_in_the_order_of_the_codes(site: Path) -> None:
     codes, order = sorted(CATALOGUE), sorted(CATALOGUE)[:1]
-    while found := re.search(
+    while match := re.search(
         r'codes/(\w+)\.html"><small>Next', (site / f"codes/{order[-1]}.html").read_text("utf-8")
     ):
-        order.append(found[1])
+        order.append(match[1])
     assert order == codes
 
 
@@ -133,7 +133,7 @@ def test_each_topic_command_code_and_key_has_its_page(
         text = (site / f"codes/{code}.html").read_text("utf-8")
         assert f"<h1>{entry.name} ({code})</h1>" in text
         assert f'<li class="{entry.severity}">' in text
-    for language in ("robot", "preset", "node", "fleet"):
+    for language in ("robot", "preset", "node", "fleet", "test"):
         anchors = pages[site / f"keys/{language}.html"].anchors
         for section in reference_of(language).sections:
             keys = {key_anchor(section.title, key.name) for key in section.keys}
@@ -159,15 +159,15 @@ def test_a_page_of_a_code_shows_what_can_be_set_and_who_mentions_it(site: Path) 
 def test_the_search_knows_every_page(
     site: Path, pages: dict[Path, Parsed], index: list[tuple[str, str, str, str]]
 ) -> None:
-    found = set()
+    indexed = set()
     for _, title, address, text in index:
         path, _, anchor = address.partition("#")
         assert title
         assert "<" not in title
         assert "`" not in text
         assert not anchor or anchor in pages[site / path].anchors, address
-        found.add(site / path)
-    assert pages.keys() - found == {site / "index.html"}
+        indexed.add(site / path)
+    assert pages.keys() - indexed == {site / "index.html"}
 
 
 def test_names_in_a_text_become_links_where_they_first_occur() -> None:
@@ -206,8 +206,10 @@ def test_a_second_run_gives_the_same_site(site: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "tfcompose", "help", "--html", "other"]
     processes.run(command, cwd=tmp_path, env=environment, check=True)
     files = {file.relative_to(site): file.read_bytes() for file in site.rglob("*.*")}
-    others = tmp_path / "other"
-    assert files == {file.relative_to(others): file.read_bytes() for file in others.rglob("*.*")}
+    second_site = tmp_path / "other"
+    assert files == {
+        file.relative_to(second_site): file.read_bytes() for file in second_site.rglob("*.*")
+    }
 
 
 def test_files_of_others_are_kept_and_pages_of_an_earlier_site_are_not(tmp_path: Path) -> None:

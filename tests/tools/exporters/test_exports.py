@@ -8,7 +8,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, get_args
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -18,12 +18,14 @@ from tests.support import processes
 from tests.support.findings import words_of
 from tests.support.plans import built, compiled_plan
 from tests.support.robots import DRIVEN
+from tfcompose.cli import main
 from tfcompose.launcher.program import anywhere
 from tfcompose.model.plan import Plan, PlanProcess, StopRule
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import stand_ins, static_names
 from tfcompose.model.systemd import source_then_run
 from tfcompose.tools.exporters.launch import launch
+from tfcompose.tools.exporters.launch_frontends import LaunchFile, LaunchFormat
 from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 ROBOT = (Path(__file__).parents[3] / "robots" / "autonomous_robot.yaml").read_text("utf-8")
@@ -57,7 +59,7 @@ def units(
     return {file.path: unit(file.text) for file in systemd(plan, machine)[0]}
 
 
-def test_each_process_that_is_started_is_a_unit_and_the_target_wants_them_all() -> None:
+def test_each_started_process_is_a_unit_and_the_target_wants_them_all() -> None:
     made = units(compiled_plan(DRIVEN))
     names = {f"rover-{name}.service" for name in ("static", "drive", "slam", "guard")}
     assert set(made) == {"rover.target", *names}
@@ -78,7 +80,7 @@ def test_own_processes_say_when_they_are_ready_and_others_are_executed() -> None
     }
 
 
-def test_processes_whose_names_differ_in_a_slash_alone_have_a_unit_and_a_service_each() -> None:
+def test_names_that_differ_only_in_a_slash_keep_separate_units() -> None:
     names = ("left/arm", "left-arm", "left arm", "arm")
     waits = PlanProcess("last", "run", argv=("last",), after={"left/arm": "started"})
     processes = (*(PlanProcess(name, "run", argv=(name,)) for name in names), waits)
@@ -221,7 +223,7 @@ def test_a_strict_guard_is_started_before_what_it_passes_on() -> None:
     assert services["static"]["depends_on"] == {"guard": {"condition": "service_started"}}
 
 
-def test_each_process_is_a_service_on_the_hosts_network_that_waits_as_the_plan_says() -> None:
+def test_each_process_is_a_service_on_the_host_network_with_its_waits() -> None:
     plan = compiled_plan(DRIVEN)
     (file,), output = compose(plan, Machine("..", image="robot:1"))
     made = yaml.safe_load(file.text)
@@ -256,23 +258,23 @@ def test_each_process_is_a_service_on_the_hosts_network_that_waits_as_the_plan_s
 
 
 @pytest.mark.parametrize("profiles", [(), ("demo",)])
-def test_every_service_that_waits_for_health_has_a_check_of_an_edge_of_the_plan(
+def test_every_service_that_awaits_health_checks_an_edge_of_the_plan(
     profiles: tuple[str, ...],
 ) -> None:
     plan = compiled_plan(ROBOT, *profiles)
     services = yaml.safe_load(compose(plan, Machine(".."))[0][0].text)["services"]
     edges = {(edge.parent, edge.child) for edge in plan.edges}
     for service in services.values():
-        for other, how in service.get("depends_on", {}).items():
-            assert other in services
-            assert how["condition"] != "service_healthy" or "healthcheck" in services[other]
+        for awaited, how in service.get("depends_on", {}).items():
+            assert awaited in services
+            assert how["condition"] != "service_healthy" or "healthcheck" in services[awaited]
         if "healthcheck" in service:
             words = service["healthcheck"]["test"]
             assert words[0] == "CMD"
             assert tuple(words[words.index("echo") + 1 :][:2]) in edges
 
 
-def test_a_health_check_has_ross_environment_also_where_only_the_entry_point_sources_it(
+def test_a_health_check_has_the_ros_environment_of_the_entry_point(
     tmp_path: Path,
 ) -> None:
     service = yaml.safe_load(compose(compiled_plan(DRIVEN), Machine(".."))[0][0].text)["services"][
@@ -324,8 +326,10 @@ def test_a_host_is_a_profile_and_nobody_waits_for_a_service_of_another() -> None
 
 def test_a_folder_that_a_container_does_not_have_is_reported() -> None:
     plan = compiled_plan(DRIVEN)
-    there = {"drive": "${build_dir}/x", "slam": "${build_dir}/../.."}
-    processes = tuple(replace(process, cwd=there.get(process.name)) for process in plan.processes)
+    folders = {"drive": "${build_dir}/x", "slam": "${build_dir}/../.."}
+    processes = tuple(
+        replace(process, cwd=folders.get(process.name)) for process in plan.processes
+    )
     output = compose(replace(plan, processes=processes), Machine(".."))[1]
     (line,) = [line for line in output if "${build_dir}" in line]
     assert all(name in line for name in ("slam", "${build_dir}/../..", "/robot"))
@@ -383,7 +387,7 @@ def launched(
         files["robot.state_publisher.urdf"], "utf-8"
     )
     (folder / "launch").mkdir()
-    (file,), _ = launch(plan, Machine(".."), files["robot.state_publisher.urdf"])
+    (file,), _ = launch(plan, LaunchFile(".."), files["robot.state_publisher.urdf"])
     return plan, load(file.text, folder / "launch" / file.path, monkeypatch)
 
 
@@ -415,23 +419,23 @@ def test_stock_nodes_send_the_edges_that_our_publishers_send_and_no_other(
     text: str, profiles: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, actions = launched(text, tmp_path, monkeypatch, *profiles)
-    own = {
+    own_edges = {
         (edge.parent, edge.child): edge
         for edge in plan.edges
         if edge.owner in ("static", "joints")
     }
     edges = sent(actions)
-    assert set(edges) == set(own)
+    assert set(edges) == set(own_edges)
     for ends, pose in edges.items():
         if pose is not None:
             assert pose == pytest.approx(
-                [*own[ends].pose.xyz, *own[ends].pose.quat_xyzw], abs=1e-12
+                [*own_edges[ends].pose.xyz, *own_edges[ends].pose.quat_xyzw], abs=1e-12
             )
     names = [action.name for action in actions if action.kind in ("Node", "LifecycleNode")]
     assert len(names) == len(set(names))
 
 
-def test_a_launch_file_has_prefixes_and_delays_and_what_has_a_schedule_is_started_as_up_does(
+def test_a_launch_file_keeps_prefixes_and_delays_and_schedules_use_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     keys = "restart: always, restart_delay: 2500 ms, prefix: nice -n 5"
@@ -536,9 +540,9 @@ def test_without_a_joint_in_the_urdf_our_own_publisher_is_started(
 
 def test_stock_nodes_stand_in_for_our_own_publishers_alone() -> None:
     plan = compiled_plan(DRIVEN)
-    others = stand_ins(plan)
-    assert set(others) == {edge.child for edge in plan.edges if edge.owner == "static"}
-    assert others["dock"] == {"/r1/robot_state_publisher", "/r1/static_dock"}
+    nodes_by_child = stand_ins(plan)
+    assert set(nodes_by_child) == {edge.child for edge in plan.edges if edge.owner == "static"}
+    assert nodes_by_child["dock"] == {"/r1/robot_state_publisher", "/r1/static_dock"}
     edges = tuple(replace(edge, child=edge.child.replace("lidar", "do/ck")) for edge in plan.edges)
     edges = tuple(replace(edge, child=edge.child.replace("dock", "do_ck")) for edge in edges)
     names = static_names(replace(plan, edges=edges))
@@ -560,9 +564,9 @@ processes:
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_whom_launch_does_not_wait_for_is_reported_and_a_time_is_waited_for() -> None:
+def test_a_wait_that_launch_lacks_is_reported_and_a_delay_is_kept() -> None:
     _, gaps = launch(
-        compiled_plan(TIMED), Machine(".."), built(TIMED)["robot.state_publisher.urdf"]
+        compiled_plan(TIMED), LaunchFile(".."), built(TIMED)["robot.state_publisher.urdf"]
     )
     waits = {line.split()[0]: words_of(line) for line in gaps if "does not wait" in line}
     assert set(waits) == {"filter", "other"}
@@ -627,8 +631,8 @@ def test_a_launch_file_of_the_plan_is_included(
     plan, actions = launched(INCLUDING, tmp_path, monkeypatch)
     assert not [action for action in actions if action.kind == "ExecuteProcess"]
     (group,) = (action for action in actions if action.kind == "GroupAction")
-    *settings, found = group.words[0]
-    (include,) = found.function(None)
+    *settings, opaque = group.words[0]
+    (include,) = opaque.function(None)
     assert [(each.kind, each.words) for each in settings] == [
         ("SetEnvironmentVariable", ("LEVEL", "debug")),
         ("PushRosNamespace", ("r1/eyes",)),
@@ -637,7 +641,7 @@ def test_a_launch_file_of_the_plan_is_included(
     ]
     assert include.words[0].words == (str(file),)
     assert include.launch_arguments == [("camera_name", "front"), ("config", f"{tmp_path}/x.yaml")]
-    _, gaps = launch(plan, Machine(".."), built(INCLUDING)["robot.state_publisher.urdf"])
+    _, gaps = launch(plan, LaunchFile(".."), built(INCLUDING)["robot.state_publisher.urdf"])
     assert [words for line in gaps if (words := words_of(line)) >= {"camera", "again"}]
 
 
@@ -648,7 +652,7 @@ def test_no_line_of_a_launch_file_is_long(text: str, profiles: tuple[str, ...]) 
     files = built(text, *profiles)
     (file,), _ = launch(
         read_plan(files["plan.json"], "plan.json"),
-        Machine(".."),
+        LaunchFile(".."),
         files["robot.state_publisher.urdf"],
     )
     assert max(map(len, file.text.splitlines())) <= 120
@@ -661,7 +665,7 @@ def test_no_line_of_a_launch_file_is_long(text: str, profiles: tuple[str, ...]) 
 def test_what_launch_does_otherwise_with_a_process_is_reported() -> None:
     text = DRIVEN.replace("node: slam,", "node: slam, lifecycle: active,")
     _, output = launch(
-        compiled_plan(text), Machine(".."), built(text)["robot.state_publisher.urdf"]
+        compiled_plan(text), LaunchFile(".."), built(text)["robot.state_publisher.urdf"]
     )
     ours = [words_of(line) for line in output]
     for names in (
@@ -673,7 +677,7 @@ def test_what_launch_does_otherwise_with_a_process_is_reported() -> None:
         assert any(words >= names for words in ours), names
 
 
-def test_where_a_urdf_is_not_all_that_we_send_our_own_publishers_are_started(
+def test_own_publishers_start_unless_a_urdf_holds_all_edges(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = ROBOT.replace(
@@ -724,7 +728,8 @@ def test_a_container_is_the_unit_and_what_it_loads_is_none() -> None:
     assert "a" not in services
 
 
-def test_a_launch_file_starts_no_publisher_without_an_edge() -> None:
+@pytest.mark.parametrize("form", get_args(LaunchFormat))
+def test_a_launch_file_starts_no_publisher_without_an_edge(form: LaunchFormat) -> None:
     robot = """
 tfcompose: 1
 robot: rover
@@ -733,6 +738,111 @@ processes: {drive: {run: {package: demo, executable: drive}}}
 """
     files = built(robot)
     plan = read_plan(files["plan.json"], "plan.json")
-    (file,), gaps = launch(plan, Machine(".."), files["robot.state_publisher.urdf"])
+    (file,), gaps = launch(plan, LaunchFile("..", form), files["robot.state_publisher.urdf"])
     assert "static" not in file.text
     assert any("static" in gap for gap in gaps)
+
+
+# Launch files in XML and YAML; test_launch_formats_ros has what launch makes of them.
+
+CONDITIONAL = """
+tfcompose: 1
+robot: rover
+args: {sim: {type: bool, default: false}}
+links: {base_link: {}}
+processes:
+  drive:
+    run: {package: demo, executable: drive, args: [a b, "${args.sim}"]}
+    params: {sim: "${args.sim}"}
+    env: {A: '$(x)'}
+    restart: always
+    restart_delay: 2 s
+    output: log
+  tool: {run: [sh, -c, exit], when: "${not args.sim}"}
+  talker: {component: demo/demo::Talker, container: box, params: {b: [x, y], e: true, n: 5}}
+containers: {box: {}}
+"""
+#: Neither has lifecycle nodes, or can wait for an end.
+PYTHON_ONLY = """
+tfcompose: 1
+robot: rover
+links: {base_link: {}}
+processes:
+  map: {run: {package: maps, executable: server}, lifecycle: active}
+  load: {run: [load]}
+  drive:
+    run: [drive]
+    after: {load: done}
+"""
+
+
+def exported(folder: Path, text: str, form: str) -> tuple[int, Path]:
+    (folder / "robot.yaml").write_text(text, "utf-8")
+    code = main(["export", "launch", "robot.yaml", "-o", "out", "--format", form])
+    return code, folder / f"out/launch/rover.launch.{form}"
+
+
+def entities(element: ET.Element) -> list[Any]:
+    """Return an element as launch reads YAML: attributes as texts, and entities in lists."""
+    children = [entities(child) for child in element]
+    return [element.tag, dict(element.attrib), children]
+
+
+def as_element(name: str, data: dict[str, Any]) -> ET.Element:
+    """Return an entity in YAML as an element."""
+    element = ET.Element(name)
+    for key, value in data.items():
+        if key == "children":
+            element.extend(as_element(*pair) for child in value for pair in child.items())
+        elif isinstance(value, list) and isinstance(value[0], dict):
+            element.extend(as_element(key, child) for child in value)
+        elif isinstance(value, list):
+            element.set(key, ", ".join(value))
+            element.set(f"{key}-sep", ", ")
+        else:
+            element.set(key, str(value).lower() if isinstance(value, bool) else str(value))
+    return element
+
+
+def test_xml_and_yaml_launch_files_have_the_same_entities(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, xml = exported(tmp_path, CONDITIONAL, "xml")
+    assert code == 0
+    assert "drive also prints its stderr" in capsys.readouterr().out
+    root = ET.fromstring(xml.read_text("utf-8"))  # noqa: S314 (our own)
+    code, file = exported(tmp_path, CONDITIONAL, "yaml")
+    assert code == 0
+    launched = yaml.safe_load(file.read_text("utf-8"))["launch"]
+    read = [as_element(*pair) for entity in launched for pair in entity.items()]
+    assert [entities(element) for element in read] == [entities(element) for element in root]
+    (drive,) = root.findall("node[@exec='drive']")
+    assert drive.get("args") == "'a b' $(var sim)"
+    assert {env.get("name"): env.get("value") for env in drive.findall("env")} == {"A": "\\$(x)"}
+    (tool,) = root.findall("executable")
+    assert tool.get("unless") == "$(var sim)"
+    types = [param.get("type") for param in root.findall(".//composable_node/param")]
+    assert types == ["list_of_str", "bool", "int"]
+
+
+@pytest.mark.parametrize("form", ["xml", "yaml"])
+def test_what_only_python_can_do_is_found_at_its_key(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, file = exported(tmp_path, PYTHON_ONLY, form)
+    errors = capsys.readouterr().err
+    assert (code, file.exists()) == (1, False)
+    assert [line.split(" ", 1)[0] for line in errors.splitlines() if "[TF928]" in line] == [
+        "robot.yaml:6:62:",
+        "robot.yaml:10:12:",
+    ]
+    assert exported(tmp_path, PYTHON_ONLY, "python")[0] == 0
+
+
+def test_only_launch_files_have_a_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robot.yaml").write_text(PYTHON_ONLY, "utf-8")
+    assert main(["export", "systemd", "robot.yaml", "--format", "xml"]) == 2
+    assert not (tmp_path / "build").exists()

@@ -141,7 +141,7 @@ class Supervisor:
 
 def units(folder: Path) -> dict[str, Service]:
     """Read units as systemd does, as far as they are ours."""
-    found = {}
+    services = {}
     logs = folder / "log"
     for file in sorted(folder.glob("*.service")):
         lines_of: dict[str, list[str]] = {}
@@ -155,14 +155,14 @@ def units(folder: Path) -> dict[str, Service]:
         env = {name: value.replace("%L", str(logs)) for name, value in env.items()}
         argv = [word.replace("$$", "$") for word in shlex.split(lines_of["ExecStart"][0])]
         after = [Path(unit).stem for line in lines_of.get("After", []) for unit in line.split()]
-        found[file.stem] = Service(
+        services[file.stem] = Service(
             argv,
             env,
             Path(lines_of["WorkingDirectory"][0]),
             after,
             notifies=lines_of["Type"] == ["notify"],
         )
-    return found
+    return services
 
 
 def services(folder: Path) -> dict[str, Service]:

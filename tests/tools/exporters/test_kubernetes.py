@@ -61,8 +61,8 @@ def workloads(made: dict[str, Any]) -> dict[str, Any]:
 
 
 def pod_of(made: dict[str, Any], name: str) -> dict[str, Any]:
-    (found,) = [workload for path, workload in workloads(made).items() if path.startswith(name)]
-    pod: dict[str, Any] = found["spec"]["template"]
+    (workload,) = [workload for path, workload in workloads(made).items() if path.startswith(name)]
+    pod: dict[str, Any] = workload["spec"]["template"]
     return pod
 
 
@@ -98,7 +98,7 @@ def test_no_edge_has_two_publishers_during_an_update() -> None:
         )
 
 
-def test_what_is_waited_for_until_it_is_done_is_a_job_and_each_runs_on_its_host() -> None:
+def test_a_process_awaited_until_done_is_a_job_and_each_runs_on_its_host() -> None:
     made, gaps = manifests(HOSTED)
     kinds = {name: workload["kind"] for name, workload in workloads(made).items()}
     (spawner,) = [name for name in kinds if name.startswith("big-rover-spawner-")]
@@ -136,7 +136,7 @@ def test_what_is_waited_for_until_it_is_done_is_a_job_and_each_runs_on_its_host(
     }, "a pod cannot see that another was started, or is done"
 
 
-def test_a_pod_waits_for_an_edge_or_a_time_and_its_probes_watch_an_edge_of_the_process() -> None:
+def test_a_pod_waits_for_an_edge_or_a_delay_and_probes_an_edge_of_its_own() -> None:
     made, _ = manifests(DRIVEN)
     (wait,) = pod_of(made, "rover-slam")["spec"]["initContainers"]
     words = wait["command"]
@@ -186,7 +186,7 @@ def test_a_process_is_ended_as_the_plan_says() -> None:
     assert "kill -s INT 1" in slam["containers"][0]["lifecycle"]["preStop"]["exec"]["command"][2]
 
 
-def test_the_config_map_gives_each_pod_the_files_that_it_reads_where_it_reads_them() -> None:
+def test_the_config_map_gives_each_pod_its_files_at_their_paths() -> None:
     made, _ = manifests(DRIVEN)
     data = made["plan.yaml"]["data"]
     files = built(DRIVEN)

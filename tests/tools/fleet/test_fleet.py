@@ -90,7 +90,7 @@ def test_for_one_pose_only_robots_with_edges_between_its_frames_are_heard(two: T
         observer.close()
 
 
-def test_a_broken_link_is_stale_within_3_s_and_live_again_when_it_is_mended(
+def test_a_broken_link_is_stale_within_3_s_and_live_again_once_mended(
     two: Two, observe: Callable[[dict[str, str]], FleetObserver]
 ) -> None:
     observer = observe(two.routers)
@@ -203,7 +203,7 @@ def tf(*edges: tuple[str, str], stamp_ns: int = 0) -> bytes:
     )
 
 
-def test_only_shared_edges_leave_with_their_names_in_the_fleet_once_in_each_period() -> None:
+def test_only_shared_edges_leave_with_fleet_names_once_per_period() -> None:
     edges = SharedEdges(fleet_of({"r1": "tcp/localhost:1"}, rate="5 Hz"), "r1")
     message = tf(("odom", "base_link"), ("base_link", "laser"), stamp_ns=7)
     period_ns = 200_000_000
@@ -261,14 +261,14 @@ def test_of_twenty_robots_all_are_listed_and_the_one_that_dies_is_stale(tmp_path
             def poses(pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
                 """Return the pairs between which there is no pose."""
                 missing = []
-                for pair, other in pairs:
+                for first, second in pairs:
                     try:
-                        observer.pose(f"{pair}/base_link", f"{other}/base_link")
+                        observer.pose(f"{first}/base_link", f"{second}/base_link")
                     except (StaleError, TransformException):
-                        missing.append((pair, other))
+                        missing.append((first, second))
                 return missing
 
-            pairs = [(name, other) for name in names for other in names]
+            pairs = [(first, second) for first in names for second in names]
             assert until(lambda: not poses(pairs))
             command = [sys.executable, "-m", "tfcompose", "fleet", "ps", "--format", "json"]
 

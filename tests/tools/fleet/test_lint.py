@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tfcompose.cli import main
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.spec.load import load
 from tfcompose.tools.fleet.check import check_fleet
@@ -21,7 +22,7 @@ robots:
 """
 
 
-def found(text: str) -> list[tuple[str, int]]:
+def places_of(text: str) -> list[tuple[str, int]]:
     source = load(text, "fleet.yaml")
     try:
         findings = list(check_fleet(validate_fleet(source), source))
@@ -31,7 +32,7 @@ def found(text: str) -> list[tuple[str, int]]:
 
 
 def test_a_sound_fleet_has_edges_with_rates_and_names_of_its_own() -> None:
-    assert found(SOUND) == []
+    assert places_of(SOUND) == []
     fleet = validate_fleet(load(SOUND, "fleet.yaml"))
     assert [(edge.ends, edge.rate) for edge in fleet.edges_of("r1")] == [
         (("map", "odom"), 5.0),
@@ -77,15 +78,27 @@ def test_the_rate_may_stand_behind_the_edge(text: str) -> None:
 def test_what_is_wrong_is_found_at_its_place(
     old: str, new: str, expected: list[tuple[str, int]]
 ) -> None:
-    assert found(SOUND.replace(old, new, 1)) == expected
+    assert places_of(SOUND.replace(old, new, 1)) == expected
 
 
-def test_a_file_that_begins_as_a_robots_does_is_answered_with_how_a_fleets_begins() -> None:
+def test_a_file_that_starts_like_a_robot_is_answered_with_a_fleets_start() -> None:
     with pytest.raises(RejectedError) as raised:
         validate_fleet(load(SOUND.replace("fleet: 1", "tfcompose: 1"), "fleet.yaml"))
     assert any(
         finding.code == "TF101" and "fleet: 1" in finding.help for finding in raised.value.findings
     )
+
+
+def test_an_empty_file_is_answered_with_a_fleets_start(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "fleet.yaml").write_text("", "utf-8")
+    assert main(["fleet", "lint", str(tmp_path / "fleet.yaml")]) == 1
+    assert "fleet: 1" in capsys.readouterr().err
+    robot = "tfcompose: 1\nrobot: r1\nlinks: {base_link: {}}\nfleet: fleet.yaml\n"
+    (tmp_path / "robot.yaml").write_text(robot, "utf-8")
+    assert main(["lint", str(tmp_path / "robot.yaml")]) == 1
+    assert "fleet: 1" in capsys.readouterr().out
 
 
 def test_the_command_lints_and_needs_a_robot_that_is_there(tmp_path: Path) -> None:

@@ -55,10 +55,10 @@ def test_the_tree_is_the_same_after_each_edge_that_is_handed_over(folder: Path) 
     assert len(before) == 3
     for handed_over in range(1, 4):
         hand_over_first(folder, robot.name, launch.name)
-        own, others = poses(robot.read_text("utf-8"), "static"), published_by(launch)
-        assert len(own) == handed_over
-        assert not own.keys() & others.keys()
-        together = own | others
+        robot_poses, launch_poses = poses(robot.read_text("utf-8"), "static"), published_by(launch)
+        assert len(robot_poses) == handed_over
+        assert not robot_poses.keys() & launch_poses.keys()
+        together = robot_poses | launch_poses
         assert together.keys() == before.keys()
         for edge, pose in together.items():
             assert pose.xyz == pytest.approx(before[edge].xyz, abs=1e-9)

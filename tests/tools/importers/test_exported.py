@@ -94,19 +94,21 @@ def edges_of(robot: Robot) -> dict[str, Any]:
 
 def same_tree(before: Robot, after: Robot) -> None:
     """All that tfcompose's own publishers send is there again, to 1e-9."""
-    own = {
+    edges_before = {
         name: edge for name, edge in edges_of(before).items() if edge.owner in {"static", "joints"}
     }
-    there = edges_of(after)
-    assert own.keys() <= there.keys()
-    for name, edge in own.items():
+    edges_after = edges_of(after)
+    assert edges_before.keys() <= edges_after.keys()
+    for name, edge in edges_before.items():
         assert (edge.kind, edge.joint_name if edge.joint else "") == (
-            there[name].kind,
-            there[name].joint_name if there[name].joint else "",
+            edges_after[name].kind,
+            edges_after[name].joint_name if edges_after[name].joint else "",
         )
-        off = max(abs(a - b) for a, b in zip(edge.pose.xyz, there[name].pose.xyz, strict=True))
+        off = max(
+            abs(a - b) for a, b in zip(edge.pose.xyz, edges_after[name].pose.xyz, strict=True)
+        )
         assert off < 1e-9
-        assert angle_between(edge.pose.quat_xyzw, there[name].pose.quat_xyzw) < 1e-9
+        assert angle_between(edge.pose.quat_xyzw, edges_after[name].pose.quat_xyzw) < 1e-9
 
 
 @pytest.mark.parametrize("file", ROBOTS, ids=[file.stem for file in ROBOTS])
@@ -120,10 +122,10 @@ def test_the_import_of_an_export_is_the_same_robot(file: Path, tmp_path: Path) -
     assert before
     assert after
     same_tree(before, after)
-    wanted, found = started_with(before), started_with(after)
-    assert wanted.keys() <= found.keys()
-    for name, value in wanted.items():
-        assert found[name] == value, name
+    expected, started = started_with(before), started_with(after)
+    assert expected.keys() <= started.keys()
+    for name, value in expected.items():
+        assert started[name] == value, name
 
 
 @pytest.fixture(scope="module")
@@ -145,12 +147,12 @@ def test_arguments_and_conditions_are_there_again(
     assert before
     assert after
     same_tree(before, after)
-    wanted, found = started_with(before), started_with(after)
-    gates = found.keys() - wanted.keys()
+    expected, started = started_with(before), started_with(after)
+    gates = started.keys() - expected.keys()
     assert all(name.startswith("delay") for name in gates)
-    assert {name: found[name] for name in wanted} == wanted
-    assert ("slam" in wanted) == ("slam" in found)
-    if "slam" in found:
+    assert {name: started[name] for name in expected} == expected
+    assert ("slam" in expected) == ("slam" in started)
+    if "slam" in started:
         (slam,) = (process for process in after.processes if process.name == "slam")
         assert (slam.after, slam.node) == ({"calibrate": "done"}, "/toolbox")
 
@@ -168,7 +170,7 @@ def test_an_argument_that_decides_more_than_processes_has_its_value(
     assert "height is 0.5" in capfd.readouterr().out
 
 
-def test_arguments_of_an_entry_that_launch_cannot_compute_have_their_values(
+def test_entry_arguments_that_launch_cannot_compute_keep_their_values(
     tmp_path: Path,
 ) -> None:
     text = ARGUED.replace('"--n=${args.cameras}"', '"--n=${args.cameras * 2}"')

@@ -222,7 +222,7 @@ manipulators:
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_an_arm_of_clearpaths_has_its_gripper_at_its_end_and_what_is_not_enabled_is_left_out(
+def test_a_clearpath_arm_carries_its_gripper_and_omits_disabled_parts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "robot.yaml"
@@ -261,7 +261,7 @@ sensors:
 """
 
 
-def test_clearpaths_entries_have_what_its_generator_gives_them_unless_they_say_otherwise(
+def test_clearpath_entries_take_the_defaults_of_its_generator(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "robot.yaml"

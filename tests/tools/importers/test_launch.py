@@ -173,13 +173,13 @@ def test_what_is_not_taken_is_named_with_its_line(
 ) -> None:
     text, _ = import_of(source(package, "rover.launch.py", PYTHON), code=None)
     lines = PYTHON.splitlines()
-    wanted = ['"cameras", default', 'executable="rviz2"']
-    found = places(printed_errors(capsys), "TF020")
-    for words in wanted:
+    expected = ['"cameras", default', 'executable="rviz2"']
+    reported = places(printed_errors(capsys), "TF020")
+    for words in expected:
         line = next(
             number for number, text_line in enumerate(lines, start=1) if words in text_line
         )
-        assert f"rover.launch.py:{line}" in found
+        assert f"rover.launch.py:{line}" in reported
         assert f"rover.launch.py:{line}: " in text
     assert "cameras:=2" in text
     assert "rviz:=false" in text
@@ -194,8 +194,8 @@ def test_what_an_included_file_lacks_is_named_and_all_else_of_it_is_there(
         "first": {"other": 1},
         "second": {"speed": "${args.unit}"},
     }
-    found = places(printed_errors(capsys), "TF020")
-    assert found == [
+    reported = places(printed_errors(capsys), "TF020")
+    assert reported == [
         "a.launch.py:8",
         "inner.launch.py:7",
         "inner.launch.py:8",
@@ -312,7 +312,7 @@ ADDRESSES = """<launch>
 """
 
 
-def test_a_number_with_a_point_stays_a_double_as_a_parameter_and_keeps_its_text_in_a_command(
+def test_a_double_stays_a_double_parameter_and_keeps_its_text_in_a_command(
     tmp_path: Path,
 ) -> None:
     file = source(tmp_path, "a.launch.py", DOUBLE)
@@ -516,7 +516,7 @@ def test_the_clock_of_parameter_files_is_the_robots_if_all_agree(
     assert (clocks["a"], clocks["b"], clocks["c"]) == ("true", False, None)
 
 
-def test_the_clock_of_a_state_publisher_is_the_robots_and_nodes_without_one_are_named(
+def test_the_robot_takes_a_state_publishers_clock_and_names_other_nodes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = '<param name="use_sim_time" value="true"/> </node>'
@@ -633,7 +633,7 @@ def generate_launch_description():
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_launch_arguments_become_arguments_of_the_robot_where_launch_would_read_them_alike(
+def test_launch_arguments_become_arguments_if_launch_reads_them_alike(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = source(tmp_path, "a.launch.py", WITH_ARGUMENTS)
@@ -952,7 +952,7 @@ PUBLISHERS = """<launch>
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_named(
+def test_a_static_publisher_component_is_a_frame_and_bad_ones_are_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _, data = import_of(source(tmp_path, "a.launch.xml", PUBLISHERS), code=None)
@@ -962,13 +962,13 @@ def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_n
         "rpy": [0, 0, "180 deg"],
     }
     assert list(data["processes"]) == ["moves"]
-    wanted = [
+    lines = [
         number
         for number, line in enumerate(PUBLISHERS.splitlines(), start=1)
         if "p::Moves" in line or 'target=""' in line
     ]
     assert set(places(printed_errors(capsys), "TF020")) == {
-        f"a.launch.xml:{line}" for line in wanted
+        f"a.launch.xml:{line}" for line in lines
     }
 
 
@@ -1002,8 +1002,8 @@ def test_an_action_that_launch_would_refuse_later_does_not_end_the_others(
         "restart": "always",
     }
     assert data["processes"]["odd"] == {"component": "a/a::B::", "container": "box"}
-    found = places(printed_errors(capsys), "TF020")
-    assert {f"odd.launch.py:{line}" for line in (8, 10, 11, 12, 13)} <= set(found)
+    reported = places(printed_errors(capsys), "TF020")
+    assert {f"odd.launch.py:{line}" for line in (8, 10, 11, 12, 13)} <= set(reported)
 
 
 REFUSED = {
@@ -1032,7 +1032,7 @@ def test_what_launch_refuses_is_its_error_with_its_place(
     assert places(printed_errors(capsys), "TF002") == [f"{name}:{line}"]
 
 
-def test_an_included_file_that_launch_refuses_is_named_and_all_else_is_there(
+def test_an_include_that_launch_refuses_is_named_and_the_rest_is_kept(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source(tmp_path, "bad.launch.xml", REFUSED["a.launch.xml"][0])
@@ -1067,7 +1067,7 @@ def test_an_event_that_activates_a_lifecycle_node_is_its_state(tmp_path: Path) -
     assert data["processes"]["map_server"]["lifecycle"] == "active"
 
 
-def test_a_node_that_the_source_does_not_name_keeps_its_name_and_has_the_parameters_of_all(
+def test_an_unnamed_node_keeps_its_name_and_its_parameters_go_to_all(
     tmp_path: Path,
 ) -> None:
     """__node would rename each controller that ros2_control_node loads."""
@@ -1592,9 +1592,9 @@ def test_no_launch_file_makes_a_traceback(
         for _ in range(4):
             lines = text.splitlines(keepends=True)
             for _ in range(chance.randint(1, 4)):
-                at = chance.randrange(len(lines))
-                lines[at : at + 1] = chance.choice(
-                    ([], [lines[at]] * 2, [lines[at][: len(lines[at]) // 2]])
+                index = chance.randrange(len(lines))
+                lines[index : index + 1] = chance.choice(
+                    ([], [lines[index]] * 2, [lines[index][: len(lines[index]) // 2]])
                 )
             code = main(["import", str(source(tmp_path, name, "".join(lines)))])
             printed = printed_errors(capsys)

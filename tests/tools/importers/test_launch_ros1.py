@@ -44,7 +44,7 @@ def source(folder: Path, name: str, text: str) -> Path:
         ("-", "<launch><node pkg='p' exec='e'/></launch>"),
     ],
 )
-def test_a_launch_file_of_ros_2_needs_launch_and_a_finding_says_how_to_get_it(
+def test_a_ros_2_launch_file_needs_launch_and_a_finding_tells_how(
     name: str,
     text: str,
     tmp_path: Path,
@@ -216,9 +216,9 @@ def test_no_launch_file_of_ros_1_makes_a_traceback(
     for text in (ROS1, SCOPES) * 3:
         lines = text.splitlines(keepends=True)
         for _ in range(chance.randint(1, 4)):
-            at = chance.randrange(len(lines))
-            kept = lines[at]
-            lines[at : at + 1] = chance.choice(([], [kept] * 2, [kept[: len(kept) // 2]]))
+            index = chance.randrange(len(lines))
+            kept = lines[index]
+            lines[index : index + 1] = chance.choice(([], [kept] * 2, [kept[: len(kept) // 2]]))
         file = source(tmp_path, "a.launch", "".join(lines))
         assert main(["import", str(file)]) in {0, 1, 2}
         assert "Traceback" not in printed_errors(capsys), "".join(lines)

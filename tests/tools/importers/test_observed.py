@@ -53,7 +53,7 @@ CAMERA = {
 }
 
 
-def test_which_model_a_calibrated_camera_is_stays_a_question_where_several_fit() -> None:
+def test_a_calibrated_camera_that_fits_several_models_stays_a_question() -> None:
     history = TreeHistory().knows(b"s", b"e")
     for child, (parent, xyz, quat_xyzw, gid) in CAMERA.items():
         history.takes((parent, child, 0, 0, *xyz, *quat_xyzw), gid, BEGUN_NS, static=True)

@@ -68,7 +68,7 @@ def tfcompose(*words: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_sensors_of_a_running_robot_have_their_presets_and_verify_finds_them(
+def test_sensors_of_a_running_robot_get_presets_and_verify_finds_them(
     nodes: FakeNodes, tmp_path: Path
 ) -> None:
     robot = compiled(ROBOT, tmp_path).robot

@@ -84,11 +84,15 @@ def _loaded(record: dict[str, Any]) -> dict[str, Any]:
 def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str, Any]]:
     program = next((word for word in words if "/" in word and not word.startswith("-")), words[0])
     rest = words[words.index(program) + 1 :]
-    at = rest.index("--ros-args") if "--ros-args" in rest else len(rest)
-    rules = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-r"]
+    split = rest.index("--ros-args") if "--ros-args" in rest else len(rest)
+    rules = [
+        right for left, right in zip(rest[split:], rest[split + 1 :], strict=False) if left == "-r"
+    ]
     remap = dict(reversed([rule.split(":=", 1) for rule in rules]))  # the first one counts
     name, namespace = remap.pop("__node", ""), remap.pop("__ns", "/")
-    given = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-p"]
+    given = [
+        right for left, right in zip(rest[split:], rest[split + 1 :], strict=False) if left == "-p"
+    ]
     params: dict[str, Any] = {
         name: yaml.safe_load(value) for name, value in (arg.split(":=", 1) for arg in given)
     }
@@ -101,7 +105,7 @@ def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str
     }
     return name or program, {
         "program": program,
-        "words": rest[:at],
+        "words": rest[:split],
         "namespace": namespace.strip("/"),
         "remap": remap,
         "params": typed,
@@ -166,17 +170,17 @@ def test_each_process_is_started_as_launch_would(
     (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
     file = tmp_path / name
     file.write_text(text, encoding="utf-8")
-    expected, found = started(file, *words), imported(file, *words)
+    expected, actual = started(file, *words), imported(file, *words)
     expected = {
         key: value
         for key, value in expected.items()
         if not value["program"].endswith("/static_transform_publisher")
     }
     assert expected
-    found.pop("sleep", None)  # the time of a timer, which launch starts no process for
-    assert found.keys() == expected.keys()
+    actual.pop("sleep", None)  # the time of a timer, which launch starts no process for
+    assert actual.keys() == expected.keys()
     for key, value in expected.items():
-        assert found[key] == value, key
+        assert actual[key] == value, key
 
 
 def test_actions_and_substitutions_of_other_packages_do_what_they_do(tmp_path: Path) -> None:
@@ -264,7 +268,7 @@ def generate_launch_description():
 
 
 @pytest.mark.parametrize("given", COMBINATIONS, ids=lambda given: "-".join(given.values()))
-def test_launch_starts_of_an_export_what_the_plan_of_the_same_arguments_has(
+def test_launch_starts_an_export_like_the_plan_with_the_same_arguments(
     given: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """But for what waits for another one's end: here no process is started."""
@@ -272,20 +276,20 @@ def test_launch_starts_of_an_export_what_the_plan_of_the_same_arguments_has(
     (share / "navigation_launch.py").write_text(INCLUDED, encoding="utf-8")
     (tmp_path / "argued.yaml").write_text(ARGUED, encoding="utf-8")
     file = exported(tmp_path / "argued.yaml", tmp_path / "out")
-    found = started(file, *(f"{name}:={value}" for name, value in given.items()))
+    processes = started(file, *(f"{name}:={value}" for name, value in given.items()))
     robot = compiled(ARGUED, tmp_path, **given).robot
     assert robot
     expected = of_robot(robot)
     is_included = expected.pop("nav2_bringup/navigation_launch.py", None) is not None
-    assert (found.pop("included", {}).get("words") == [given["mode"], "3"]) is is_included
-    assert found.pop("robot_state_publisher")["params"].keys() == {
+    assert (processes.pop("included", {}).get("words") == [given["mode"], "3"]) is is_included
+    assert processes.pop("robot_state_publisher")["params"].keys() == {
         "publish_frequency",
         "robot_description",
         "use_sim_time",
     }
     for after_another in ("toolbox", "/once"):
         expected.pop(after_another, None)
-    assert found == expected
+    assert processes == expected
 
 
 INCLUDED = """
@@ -369,9 +373,9 @@ def test_a_real_node_has_the_parameters_that_it_has_with_launch(
     file = Path(file_of("a.launch.py", text))
     (launched,) = recorded(file)
     texts, words = iter(launched["texts"]), launched["words"]
-    for at, word in enumerate(words):
+    for index, word in enumerate(words):
         if word == "--params-file":
-            words[at + 1] = file_of(f"launched_{at}.yaml", next(texts))
+            words[index + 1] = file_of(f"launched_{index}.yaml", next(texts))
     robot = compiled(import_of(file)[0], tmp_path).robot
     assert robot
     built = {emitted.path: emitted.text for emitted in emit(robot)}

@@ -95,7 +95,7 @@ def test_a_fixed_joint_keeps_its_name(body: str, tmp_path: Path) -> None:
     assert all(f'<joint name="{name}" type="fixed">' in urdf for name in names)
 
 
-def test_names_with_other_characters_are_taken_and_lint_no_longer_refuses_them(
+def test_names_with_other_characters_are_taken_and_lint_accepts_them(
     tmp_path: Path,
 ) -> None:
     text = imported(f"{HEAD}{fixed('the tool', name='a-b.c')}</robot>", tmp_path)
@@ -295,7 +295,7 @@ def test_options_follow_from_the_frames_that_there_are(tmp_path: Path) -> None:
     assert data(text)["sensors"]["d435i"] == {**D435, "options": options}
 
 
-def test_sensors_that_only_their_maker_can_tell_apart_stay_frames_and_a_comment_names_them(
+def test_indistinguishable_sensors_stay_frames_with_a_comment(
     tmp_path: Path,
 ) -> None:
     text = imported(d435(tmp_path), tmp_path)
@@ -308,7 +308,7 @@ def test_the_name_of_a_sensor_can_say_which_model_it_is(tmp_path: Path) -> None:
     assert data(text)["sensors"]["front_d435i"] == D435
 
 
-def test_a_value_a_little_off_the_presets_is_kept_and_one_further_off_is_no_match(
+def test_a_value_near_the_presets_is_kept_and_a_distant_one_is_no_match(
     tmp_path: Path,
 ) -> None:
     urdf = d435(tmp_path, name="d435i")
@@ -403,9 +403,9 @@ def test_a_sensor_of_which_there_is_no_more_than_a_name_is_one_question(tmp_path
     assert text.count("# is it ") == 2
     assert "sensors: {oakd: {preset: oak/oak-d-pro, parent: oakd_bracket}}" in words(text)
     assert "rplidar/a1, rplidar/a2" in words(text)
-    known = fixed("vlp16_mast") + fixed("vlp16_base_link", "vlp16_mast")
-    known += fixed("vlp16", "vlp16_base_link", 'xyz="0 0 0.0377"')
-    text = imported(f"{HEAD}{known}</robot>", tmp_path)
+    frames = fixed("vlp16_mast") + fixed("vlp16_base_link", "vlp16_mast")
+    frames += fixed("vlp16", "vlp16_base_link", 'xyz="0 0 0.0377"')
+    text = imported(f"{HEAD}{frames}</robot>", tmp_path)
     assert list(data(text)["sensors"]) == ["vlp16"]
     assert "# is it " not in text
 

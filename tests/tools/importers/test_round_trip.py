@@ -140,20 +140,20 @@ def test_a_sensor_is_recognised_or_left_as_frames_and_the_tree_is_the_same(
         for key, frame in preset.frames.items()
         if holds(frame.when, _usual(preset), "tfcompose")
     }
-    own = {
+    frame_names = {
         key.replace("{name}", "front"): UNIT for key, frame in frames.items() if frame.xyz is None
     }
-    sensor |= {"frames": own} if own else {}
+    sensor |= {"frames": frame_names} if frame_names else {}
     spec = {"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {"front": sensor}}
     spec["rules"] = {"TF401": "off"}
     urdf = urdf_of(spec, tmp_path)
     source = tmp_path / "source.urdf"
     source.write_text(urdf, encoding="utf-8")
     main(["import", str(source), "-o", str(tmp_path / "robot.yaml"), "--keep-going"])
-    found = load((tmp_path / "robot.yaml").read_text("utf-8"), "robot.yaml").data.get(
+    sensors = load((tmp_path / "robot.yaml").read_text("utf-8"), "robot.yaml").data.get(
         "sensors", {}
     )
-    taken = found.get("front", {}).get("preset")
+    taken = sensors.get("front", {}).get("preset")
     assert taken in {name, None} | ALIKE
     (tmp_path / "robot.yaml").write_text(
         (tmp_path / "robot.yaml").read_text("utf-8") + "\nrules: {TF401: off}\n"

@@ -94,8 +94,8 @@ ros2 run tf2_ros static_transform_publisher 0 0 2 0 0 0 base_link a
     text, data = import_of(source)
     assert set(data["frames"]) == {"base_link", "a"}
     assert "processes" not in data
-    found = places(printed_errors(capsys), "TF020")
-    assert sorted(set(found)) == [f"start.sh:{line}" for line in range(2, 8)]
+    reported = places(printed_errors(capsys), "TF020")
+    assert sorted(set(reported)) == [f"start.sh:{line}" for line in range(2, 8)]
     for line in range(2, 8):
         assert f"start.sh:{line}: " in text
 
@@ -252,7 +252,7 @@ print(json.dumps({name: list(value) if hasattr(value, "tolist") else value for n
 def test_a_parameter_of_a_command_line_is_what_a_real_node_takes_it_for(
     tmp_path: Path, domain: Domain
 ) -> None:
-    words = [part for at, word in enumerate(WORDS) for part in ("-p", f"p.w{at}:={word}")]
+    words = [part for index, word in enumerate(WORDS) for part in ("-p", f"p.w{index}:={word}")]
     command = [sys.executable, "-W", "ignore", "-c", READER, "--ros-args", *words]
     real = processes.run(command, env=dict(domain.environment), check=True).stdout
     line = shlex.join(["ros2", "run", "p", "e", "--ros-args", *words, "-p", "far:=.inf"])

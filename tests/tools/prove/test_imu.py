@@ -84,8 +84,8 @@ DRIVERS = {
 
 @pytest.mark.parametrize("name", MOUNTED)
 def test_another_mount_differs_with_the_rotation_that_fits(name: str, driven: Measured) -> None:
-    found = Fault(MOUNTED[name]).judge(driven)
-    differing = [judgement for judgement in found.values() if judgement.answer == "differs"]
+    judgements = Fault(MOUNTED[name]).judge(driven)
+    differing = [judgement for judgement in judgements.values() if judgement.answer == "differs"]
     assert [judgement.code for judgement in differing] == ["TF650"]
     fitting = differing[0].base_from_frame_xyzw
     assert fitting is not None
@@ -96,10 +96,12 @@ def test_another_mount_differs_with_the_rotation_that_fits(name: str, driven: Me
 
 
 def test_a_tilt_differs_and_keeps_the_heading(driven: Measured) -> None:
-    found = Fault((0, 8, 0)).judge(driven)["gravity"]
-    assert (found.answer, found.code) == ("differs", "TF650")
-    assert found.base_from_frame_xyzw is not None
-    roll, pitch, yaw = Rotation.from_quat(found.base_from_frame_xyzw).as_euler("xyz", degrees=True)
+    judgement = Fault((0, 8, 0)).judge(driven)["gravity"]
+    assert (judgement.answer, judgement.code) == ("differs", "TF650")
+    assert judgement.base_from_frame_xyzw is not None
+    roll, pitch, yaw = Rotation.from_quat(judgement.base_from_frame_xyzw).as_euler(
+        "xyz", degrees=True
+    )
     assert (abs(roll), abs(yaw)) < (1.5, 0.5)
     assert pitch == pytest.approx(8, abs=1.5), "the accelerometer's bias is up to 0.6 degrees"
 
@@ -107,15 +109,17 @@ def test_a_tilt_differs_and_keeps_the_heading(driven: Measured) -> None:
 @pytest.mark.parametrize("name", DRIVERS)
 def test_what_no_mount_explains_is_the_drivers(name: str, driven: Measured) -> None:
     fault, check = DRIVERS[name]
-    found = fault.judge(driven)
-    differing = {judgement.check for judgement in found.values() if judgement.answer == "differs"}
+    judgements = fault.judge(driven)
+    differing = {
+        judgement.check for judgement in judgements.values() if judgement.answer == "differs"
+    }
     assert differing == {check}
-    assert (found[check].code, found[check].base_from_frame_xyzw) == ("TF651", None)
+    assert (judgements[check].code, judgements[check].base_from_frame_xyzw) == ("TF651", None)
 
 
 def test_without_motion_only_gravity_is_known(at_rest: Measured) -> None:
-    found = Fault().judge(at_rest)
-    assert {name: judgement.answer for name, judgement in found.items()} == {
+    judgements = Fault().judge(at_rest)
+    assert {name: judgement.answer for name, judgement in judgements.items()} == {
         "gravity": "agrees",
         "yaw rate": "cannot tell",
         "heading": "cannot tell",
@@ -124,8 +128,8 @@ def test_without_motion_only_gravity_is_known(at_rest: Measured) -> None:
 
 
 def test_upside_down_at_rest_has_no_fit_for_the_sign_may_be_wrong(at_rest: Measured) -> None:
-    found = Fault((180, 0, 0)).judge(at_rest)["gravity"]
-    assert (found.answer, found.base_from_frame_xyzw) == ("differs", None)
+    judgement = Fault((180, 0, 0)).judge(at_rest)["gravity"]
+    assert (judgement.answer, judgement.base_from_frame_xyzw) == ("differs", None)
     sideways = Fault((90, 0, 0)).judge(at_rest)["gravity"]
     assert sideways.base_from_frame_xyzw is not None
 
@@ -147,11 +151,14 @@ def test_means_over_intervals_are_areas_below_the_lines_between_samples() -> Non
 def test_a_heading_without_accelerations_is_not_measured(at_rest: Measured) -> None:
     odometry = at_rest.odometry
     rotating = Measured(
-        [(at, force, rate + np.array([0, 0, math.sin(at)])) for at, force, rate in at_rest.imu],
-        [(at, 0.0, 0.0, math.sin(at)) for at, *_ in odometry],
+        [
+            (time_s, force, rate + np.array([0, 0, math.sin(time_s)]))
+            for time_s, force, rate in at_rest.imu
+        ],
+        [(time_s, 0.0, 0.0, math.sin(time_s)) for time_s, *_ in odometry],
     )
-    found = Fault().judge(rotating)
-    assert {name: result.answer for name, result in found.items()} == {
+    judgements = Fault().judge(rotating)
+    assert {name: result.answer for name, result in judgements.items()} == {
         "gravity": "agrees",
         "yaw rate": "agrees",
         "heading": "cannot tell",

@@ -8,15 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.support.bags import tfcompose_without_ros
+from tests.support.bags import camera_info, header, message, tfcompose_without_ros, write_bag
 from tests.support.cli import tfcompose_in
 from tests.support.simulated_rover import (
     Measured,
-    header,
-    message,
     messages_of,
     simulate,
-    write_bag,
 )
 
 ROBOT = """\
@@ -41,43 +38,22 @@ def driven() -> Measured:
     return simulate(seed=4, cloud_rate=0, seconds=16)
 
 
-def image_info(at_s: float, frame: str) -> tuple[str, float, str, Any]:
-    info = message(
-        "sensor_msgs/msg/CameraInfo",
-        header=header(at_s, frame),
-        height=480,
-        width=640,
-        distortion_model="plumb_bob",
-        d=np.zeros(5),
-        k=np.ones(9),
-        r=np.ones(9),
-        p=np.ones(12),
-        binning_x=0,
-        binning_y=0,
-        roi=message(
-            "sensor_msgs/msg/RegionOfInterest",
-            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False,
-        ),
-    )  # fmt: skip
-    return ("/camera/camera_info", at_s, "sensor_msgs/msg/CameraInfo", info)
-
-
 @pytest.fixture
 def record(tmp_path: Path, driven: Measured) -> Callable[..., Path]:
     """Return a function that writes robot.yaml and a bag, and returns their folder."""
 
     def write(
-        *others: tuple[str, float, str, Any],
+        *messages: tuple[str, float, str, Any],
         frame: str = "front_imu_link",
         factors: tuple[float, float, float] = (1, 1, 1),
         robot: str = ROBOT,
     ) -> Path:
         flipped = Measured(
-            [(at, force * factors, rate * factors) for at, force, rate in driven.imu],
+            [(time_s, force * factors, rate * factors) for time_s, force, rate in driven.imu],
             driven.odometry,
         )
         sent = messages_of(flipped, {"imu": frame})
-        write_bag(tmp_path / "bag", sorted([*sent, *others], key=lambda each: each[1]))
+        write_bag(tmp_path / "bag", messages=sorted([*sent, *messages], key=lambda each: each[1]))
         (tmp_path / "robot.yaml").write_text(robot, "utf-8")
         return tmp_path
 
@@ -141,6 +117,14 @@ def test_rules_of_the_file_set_the_limit(record: Callable[..., Path]) -> None:
     prove(folder)
 
 
+def test_a_comment_allows_a_mount_that_differs(record: Callable[..., Path]) -> None:
+    comment = "0.03]}  # tfcompose: allow TF650 because it is bent"
+    folder = record(factors=FLIPPED, robot=ROBOT.replace("0.03]}", comment))
+    checks, errors = prove(folder)
+    assert checks["front_imu", "gravity"]["answer"] == "differs"
+    assert "TF650" not in errors
+
+
 def test_forces_of_another_scale_are_the_drivers_fault(
     record: Callable[..., Path],
 ) -> None:
@@ -157,15 +141,48 @@ def test_forces_of_another_scale_are_the_drivers_fault(
 def test_images_need_a_declared_optical_frame(
     frame: str, answer: str, record: Callable[..., Path]
 ) -> None:
-    folder = record(*(image_info(at / 10, frame) for at in range(5)))
+    folder = record(*(camera_info(index / 10, frame) for index in range(5)))
     checks, errors = prove(folder, code=int(answer == "differs"))
     name = next(sensor for sensor, check in checks if check == "frame" and sensor != "front_imu")
     assert checks[name, "frame"]["answer"] == answer
     assert ("TF652" in errors) == (answer == "differs")
 
 
+@pytest.mark.parametrize(
+    ("robot", "names", "advice"),
+    [
+        (ROBOT, ("front_imo", "mast"), ("did you mean front_imu?", "mast", "are front_imu")),
+        (ROBOT.partition("sensors:")[0], ("mast",), ("mast", "no sensors")),
+    ],
+    ids=["unknown names", "an unknown frame without sensors"],
+)
+def test_an_unknown_sensor_or_frame_is_refused(
+    robot: str, names: tuple[str, ...], advice: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "robot.yaml").write_text(robot.replace("odom, owner: drive, rate: 20 Hz", "odom"))
+    done = tfcompose_in(tmp_path, "prove", "robot.yaml", *names)
+    assert done.returncode == 2
+    assert all(text in done.stderr for text in advice), done.stderr
+    assert not done.stdout
+
+
+def test_a_robot_without_sensors_says_that_nothing_came_in_its_frames(
+    tmp_path: Path, driven: Measured
+) -> None:
+    sent = [
+        each for each in messages_of(driven, {"imu": "front_imu_link"}) if "Imu" not in each[2]
+    ]
+    write_bag(tmp_path / "bag", messages=sent)
+    frames, _, rest = ROBOT.partition("sensors:")
+    robot = f"{frames}processes:{rest.partition('processes:')[2]}"
+    (tmp_path / "robot.yaml").write_text(robot, "utf-8")
+    done = tfcompose_in(tmp_path, "prove", "robot.yaml", "--bag", "bag")
+    assert done.returncode == 2
+    assert "no sensors" in done.stderr
+
+
 def test_only_named_sensors_are_checked(record: Callable[..., Path]) -> None:
-    folder = record(image_info(0.0, "camera_link"))
+    folder = record(camera_info(0.0, "camera_link"))
     checks, _ = prove(folder, "front_imu")
     assert {sensor for sensor, _ in checks} == {"front_imu"}
     done = tfcompose_in(folder, "prove", "robot.yaml", "frnt_imu", "--bag", "bag")
@@ -185,7 +202,10 @@ def test_bad_input_is_refused_before_anything_is_read(tmp_path: Path) -> None:
     assert (done.returncode, "TF907" in done.stderr) == (2, True)
     done = tfcompose_in(tmp_path, "prove", "robot.yaml", "--bag", "none", "--for", "3")
     assert done.returncode == 2
-    done = tfcompose_in(tmp_path, "prove", "none.yaml", "--for", "1")
+    for duration in ("-1 s", "5 m", "soon", "0"):
+        done = tfcompose_in(tmp_path, "prove", "robot.yaml", "--for", duration)
+        assert (done.returncode, "--for" in done.stderr) == (2, True)
+    done = tfcompose_in(tmp_path, "prove", "none.yaml", "--for", "1 s")
     assert (done.returncode, "TF001" in done.stderr) == (2, True)
 
 
@@ -213,3 +233,46 @@ def test_a_presets_topic_needs_the_frame_of_its_sensor(record: Callable[..., Pat
     checks, errors = prove(folder, code=1)
     assert checks["scanner", "frame"]["code"] == "TF652"
     assert "instead of scanner" in errors
+
+
+LIDAR = """\
+tfcompose: 1
+robot: rover
+frames:
+  odom: {}
+  base_footprint: {parent: odom, owner: drive, rate: 20 Hz}
+  base_link: {parent: base_footprint, xyz: [0, 0, 0.2]}
+sensors:
+  front: {preset: generic/lidar3d, parent: base_link, xyz: [0.3, 0.2, 36 cm]}
+processes:
+  drive: {external: true, node: diff_drive}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "robot",
+    [
+        LIDAR,
+        LIDAR.replace("robot: ", "ground: floor\nrobot: ").replace(
+            "0.2]}\nsensors", "0.5]}\n  floor: {parent: base_link, xyz: [0, 0, -0.2]}\nsensors"
+        ),
+    ],
+    ids=["base_footprint", "ground"],
+)
+def test_the_floor_shows_a_lidars_height_and_fix_writes_it(robot: str, tmp_path: Path) -> None:
+    """The lidar is 0.4 m above the base, which is not the root."""
+    measured = simulate(seed=5, seconds=9)
+    del measured.clouds["rear"], measured.clouds["camera"]
+    sent = messages_of(measured, {"imu": "base_link", "front": "front_link"})
+    write_bag(tmp_path / "bag", messages=[each for each in sent if each[0] != "/imu"])
+    (tmp_path / "robot.yaml").write_text(robot, "utf-8")
+    checks, errors = prove(tmp_path, code=1)
+    assert checks["front", "height"]["code"] == "TF653"
+    assert checks["front", "height"]["values"]["off_m"] == pytest.approx(0.04, abs=0.005)
+    assert checks["front", "forward"]["answer"] == "agrees"
+    line = 1 + robot[: robot.index("36 cm")].count("\n")
+    assert f"robot.yaml:{line}:" in errors
+    prove(tmp_path, "--fix")
+    expected = robot.replace("36 cm", "40 cm")
+    assert (tmp_path / "robot.yaml").read_text("utf-8") == expected

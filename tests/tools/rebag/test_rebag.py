@@ -16,7 +16,16 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import CompressionMode, Reader
 
 from tests.support import processes
-from tests.support.bags import START_S, STORE, UP, Sent, tfcompose_without_ros, write_bag
+from tests.support.bags import (
+    STORE,
+    UP,
+    Sent,
+    camera_info,
+    header,
+    message,
+    tfcompose_without_ros,
+    write_bag,
+)
 from tests.support.cli import tfcompose_in
 from tests.support.waiting import until
 from tfcompose.tf.bags import Recording
@@ -63,41 +72,8 @@ class Message(NamedTuple):
     data: bytes
 
 
-def message(type_: str, **fields: Any) -> Any:
-    """Return a message with these fields; the others are zero."""
-    return STORE.types[type_](**fields)
-
-
-def header(frame: str) -> Any:
-    return message(
-        "std_msgs/msg/Header",
-        stamp=message("builtin_interfaces/msg/Time", sec=START_S, nanosec=0),
-        frame_id=frame,
-    )
-
-
-def camera_info(frame: str) -> Any:
-    return message(
-        "sensor_msgs/msg/CameraInfo",
-        header=header(frame),
-        height=480,
-        width=640,
-        distortion_model="plumb_bob",
-        d=np.zeros(5),
-        k=np.ones(9),
-        r=np.ones(9),
-        p=np.ones(12),
-        binning_x=2,
-        binning_y=0,
-        roi=message(
-            "sensor_msgs/msg/RegionOfInterest",
-            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False,
-        ),
-    )  # fmt: skip
-
-
 OTHERS = (
-    ("/camera/camera_info", 0.3, "sensor_msgs/msg/CameraInfo", camera_info("old_lens")),
+    camera_info(0.3, "old_lens", binning_x=2),
     ("/text", 0.3, "std_msgs/msg/String", message("std_msgs/msg/String", data="old_lens")),
     ("/text", 0.7, "std_msgs/msg/String", message("std_msgs/msg/String", data="")),
 )
@@ -138,7 +114,7 @@ def rebag(folder: Path, *words: str, code: int = 0) -> str:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_fixed_edges_become_those_of_the_file_and_all_else_stays(folder: Path, kind: str) -> None:
-    bag = write_bag(folder / "drive", RECORDED, others=OTHERS, **KINDS[kind])
+    bag = write_bag(folder / "drive", RECORDED, messages=OTHERS, **KINDS[kind])
     output = rebag(folder, "drive", "right")
     assert "base_link → laser: off by 40 mm and 5 deg" in output
     before, after = messages_of(bag), messages_of(folder / "right")
@@ -199,15 +175,15 @@ def test_a_corrected_bag_has_nothing_more_to_correct(folder: Path) -> None:
 
 def test_check_writes_nothing_and_says_how_far_each_edge_is_off(folder: Path) -> None:
     write_bag(folder / "drive", RECORDED)
-    found = json.loads(rebag(folder, "drive", "--check", "--format", "json", code=1))
-    changes = [(each["edge"], each["change"], each["transforms"]) for each in found["edges"]]
+    report = json.loads(rebag(folder, "drive", "--check", "--format", "json", code=1))
+    changes = [(each["edge"], each["change"], each["transforms"]) for each in report["edges"]]
     assert changes == [
         ("base_link → laser", "moved", 0),
         ("base_link → bracket", "added", 0),
         ("bracket → lens", "added", 0),
         ("base_link → bracket", "removed from /tf", 1),
     ]
-    (laser,) = [each for each in found["edges"] if each["change"] == "moved"]
+    (laser,) = [each for each in report["edges"] if each["change"] == "moved"]
     assert (laser["mm"], laser["deg"]) == pytest.approx((40, 5))
     assert {each.name for each in folder.iterdir()} == {"cart.yaml", "drive"}
 
@@ -219,7 +195,7 @@ def test_undeclared_edges_are_dropped_only_on_request(folder: Path) -> None:
 
 
 def test_mcap_keeps_publish_times_sequences_and_chunk_compression(folder: Path) -> None:
-    write_bag(folder / "drive", RECORDED, others=OTHERS, compressed=CompressionMode.STORAGE)
+    write_bag(folder / "drive", RECORDED, messages=OTHERS, compressed=CompressionMode.STORAGE)
     rebag(folder, "drive/drive.mcap", "right.mcap")
     rows = []
     for file in (folder / "drive" / "drive.mcap", folder / "right.mcap"):
@@ -300,11 +276,11 @@ def test_the_pose_that_a_device_calibrated_itself_stays(folder: Path) -> None:
 def test_frames_are_renamed_in_tf_in_headers_and_at_any_depth(folder: Path) -> None:
     path = message(
         "nav_msgs/msg/Path",
-        header=header("odom"),
+        header=header(0.0, "odom"),
         poses=[
             message(
                 "geometry_msgs/msg/PoseStamped",
-                header=header("/old_laser"),
+                header=header(0.0, "/old_laser"),
                 pose=message(
                     "geometry_msgs/msg/Pose",
                     position=message("geometry_msgs/msg/Point", x=1.0, y=2.0, z=3.0),
@@ -316,8 +292,8 @@ def test_frames_are_renamed_in_tf_in_headers_and_at_any_depth(folder: Path) -> N
         ],
     )
     sent = [("/tf_static", 0.1, "base_link", "old_laser", 0.0, (0.2, 0.0, 0.3), UP)]
-    others = [*OTHERS, ("/path", 0.4, "nav_msgs/msg/Path", path)]
-    write_bag(folder / "drive", sent, others=others)
+    messages = [*OTHERS, ("/path", 0.4, "nav_msgs/msg/Path", path)]
+    write_bag(folder / "drive", sent, messages=messages)
     renames = ("--rename", "old_laser:=laser", "--rename", "old_lens:=lens")
     assert "base_link → laser: off by 40 mm" in rebag(folder, "drive", "right", *renames)
     data = {each.topic: each.data for each in messages_of(folder / "right")}
@@ -331,7 +307,7 @@ def test_frames_are_renamed_in_tf_in_headers_and_at_any_depth(folder: Path) -> N
 
 
 def test_a_topic_of_an_unknown_type_is_named(folder: Path) -> None:
-    write_bag(folder / "drive", RECORDED, others=OTHERS, mcap=False)
+    write_bag(folder / "drive", RECORDED, messages=OTHERS, mcap=False)
     with sqlite3.connect(folder / "drive" / "drive.db3") as database:
         database.execute("DELETE FROM message_definitions")
         database.execute("UPDATE topics SET type = 'acme/msg/Beep' WHERE name = '/text'")
@@ -353,7 +329,7 @@ projection_matrix: {rows: 3, cols: 4, data: [1, 0, 2, 0, 0, 3, 4, 0, 0, 0, 1, 0]
 
 def test_camera_info_is_replaced_but_for_its_header_binning_and_region(folder: Path) -> None:
     (folder / "front.yaml").write_text(CALIBRATION, "utf-8")
-    write_bag(folder / "drive", RECORDED, others=OTHERS)
+    write_bag(folder / "drive", RECORDED, messages=OTHERS)
     rebag(folder, "drive", "right", "--camera-info", "/camera/camera_info=front.yaml")
     data = {each.topic: each.data for each in messages_of(folder / "right")}
     info: Any = STORE.deserialize_cdr(data["/camera/camera_info"], "sensor_msgs/msg/CameraInfo")
@@ -380,7 +356,7 @@ def test_a_bag_or_file_that_cannot_be_used_is_a_finding(
     folder: Path, words: tuple[str, ...], code: str
 ) -> None:
     (folder / "front.yaml").write_text(CALIBRATION, "utf-8")
-    bag = write_bag(folder / "drive", RECORDED, others=OTHERS)
+    bag = write_bag(folder / "drive", RECORDED, messages=OTHERS)
     (folder / "damaged.mcap").write_bytes((bag / "drive.mcap").read_bytes()[:-3000])
     (folder / "damaged.db3").write_bytes(b"SQLite format 3\0" + bytes(3000))
     before = {each.name for each in folder.iterdir()}

@@ -34,7 +34,9 @@ def test_it_holds_each_template_as_a_launch_file_without_findings(
     done = tfcompose_in(tmp_path, "init", template, "--package", "rover_bringup")
     assert done.returncode == 0, done.stderr
     package = tmp_path / "rover_bringup"
-    robots = {"robots/rover.tfc.yaml"} | {f"robots/{other}" for other in TEMPLATES[template][1]}
+    robots = {"robots/rover.tfc.yaml"} | {
+        f"robots/{file_name}" for file_name in TEMPLATES[template][1]
+    }
     assert files_below(package) == OF_PYTHON | robots
     assert "\nrobot: rover\n" in (package / "robots/rover.tfc.yaml").read_text("utf-8")
     linted = tfcompose_in(tmp_path, "lint", "rover_bringup", "--fail-on", "warning")
@@ -129,10 +131,10 @@ def test_the_list_of_templates_needs_no_package(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("there", ["rover", "rover/mine", "a link"])
-def test_what_is_there_stays_as_it_is(there: str, tmp_path: Path) -> None:
-    path = tmp_path / there
-    if there == "a link":
+@pytest.mark.parametrize("existing", ["rover", "rover/mine", "a link"])
+def test_what_is_there_stays_as_it_is(existing: str, tmp_path: Path) -> None:
+    path = tmp_path / existing
+    if existing == "a link":
         (tmp_path / "rover").symlink_to("nowhere")
     else:
         path.parent.mkdir(exist_ok=True)

@@ -4,9 +4,11 @@ import json
 import os
 import random
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -74,17 +76,145 @@ def test_a_robot_file_is_a_launch_file_of_the_same_robot(
     assert "say" in launch.output
 
 
+#: Sends an edge, and records the process, its node and the tree as it finds them.
+RECORDER = """
+import json, os, sys
+from pathlib import Path
+import rclpy
+from geometry_msgs.msg import TransformStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from tf2_msgs.msg import TFMessage
+
+rclpy.init()
+node = rclpy.create_node("unnamed", automatically_declare_parameters_from_overrides=True)
+publisher = node.create_publisher(TFMessage, "/tf", 10)
+edge = TransformStamped()
+edge.header.frame_id, edge.child_frame_id = "odom", "base_link"
+edge.transform.translation.x = 2.5
+edge.transform.rotation.w = 1.0
+edges = {}
+
+def send():
+    edge.header.stamp = node.get_clock().now().to_msg()
+    publisher.publish(TFMessage(transforms=[edge]))
+
+def record(message):
+    for item in message.transforms:
+        at, turned = item.transform.translation, item.transform.rotation
+        pose = [at.x, at.y, at.z, turned.x, turned.y, turned.z, turned.w]
+        edges[item.child_frame_id] = [item.header.frame_id, *pose]
+    if len(edges) == 3:
+        values = {name: found.value for name, found in node.get_parameters_by_prefix("").items()}
+        data = {
+            "argv": sys.argv,
+            "cwd": os.getcwd(),
+            "edges": edges,
+            "env": dict(os.environ),
+            "niceness": os.nice(0),
+            "node": node.get_fully_qualified_name(),
+            "params": {name: value if isinstance(value, str) else repr(value) for name, value in values.items()},
+            "topic": node.resolve_topic_name("scan"),
+        }
+        file = Path(__file__).with_suffix(".json")
+        file.with_suffix(".new").write_text(json.dumps(data))
+        file.with_suffix(".new").rename(file)
+
+latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+node.create_subscription(TFMessage, "/tf", record, 10)
+node.create_subscription(TFMessage, "/tf_static", record, latched)
+node.create_timer(0.05, send)
+rclpy.spin(node)
+"""  # noqa: E501 (as above)
+RECORDED = """
+tfcompose: 1
+robot: rover
+args: {height: {type: float, default: 0.3}, mode: {type: string, default: fast}}
+ros: {discovery: localhost, namespace: inner}
+links: {base_link: {}, lidar: {parent: base_link, xyz: [0, 0, "${args.height}"], rpy: [10 deg, 0, 90 deg]}}
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+  mast: {parent: base_link, xyz: [1, 0, 0]}
+profiles:
+  demo: {frames: {mast: {xyz: [1, 2, 0]}}, processes: {drive: {env: {C: demo}}}}
+processes:
+  drive:
+    run: [PYTHON, recorder.py, two words, "${args.mode}", '', $HOME, --ros-args]
+    params: {height: "${args.height}", n: 5, text: "5", names: [a, "b, c"], numbers: [1.0, 2.5], deep: {on: true}}
+    remap: {scan: /other/scan}
+    env: {A: "x  y", B: "${args.mode}"}
+    prefix: [nice, -n, "1"]
+    log_level: debug
+  beside: {run: [sleep, "1000"]}
+"""  # noqa: E501 (as above)
+
+
+def test_ros2_launch_starts_the_same_processes_and_edges_as_up(
+    ros2_launch: Ros2Launch, domain: Domain
+) -> None:
+    folder = ros2_launch.folder
+    ros2_launch.write("recorder.py", RECORDER)
+    ros2_launch.write("rover.tfc.yaml", RECORDED.replace("PYTHON", sys.executable))
+    values = ("height:=0.5", "mode:=it's slow")
+    process = processes.start(
+        (*HERE, "up", "rover.tfc.yaml", "--profile", "demo", *values),
+        cwd=folder,
+        env={**domain.environment, "ROS_LOG_DIR": str(folder / "log")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+    by_up = ended_robot(Started(process), folder)
+    by_launch = ended_robot(ros2_launch("rover.tfc.yaml", "demo:=true", *values), folder)
+    assert by_launch == by_up
+    assert len(by_up["commands"]) >= 3
+    assert by_up["edges"]["mast"][:3] == ["base_link", 1, 2]
+    assert by_up["params"]["height"] == "0.5"
+    assert by_up["env"]["B"] == by_up["argv"][2] == "it's slow"
+    assert by_up["env"]["C"] == "demo"
+
+
+def ended_robot(started: Started, folder: Path) -> dict[str, Any]:
+    """Return what a robot that has started recorded, and its commands; end it.
+
+    The id of its run, which no other has, is RUN in it.
+    """
+    file = folder / "recorder.json"
+    try:
+        started.until_says(COMPLETE)
+        assert until(file.exists), started.output
+        root = psutil.Process(started.process.pid)
+        (up,) = [each for each in (root, *root.children(recursive=True)) if "up" in each.cmdline()]
+        commands = sorted(command_of(each) for each in up.children(recursive=True))
+        assert end(started) == 0
+    finally:
+        started.close()
+    record = json.loads(file.read_text("utf-8"))
+    file.unlink()
+    run = record["env"]["TFCOMPOSE_RUN"]
+    del record["env"]["TFCOMPOSE_LAUNCHER"]  # its pid and start
+    result: dict[str, Any] = json.loads(
+        json.dumps({**record, "commands": commands}).replace(run, "RUN")
+    )
+    return result
+
+
+def command_of(process: psutil.Process) -> list[str]:
+    """Return a command, with the program that a link such as python3 leads to."""
+    program, *arguments = process.cmdline()
+    return [os.path.realpath(program), *arguments]
+
+
 def test_ros2_launch_shows_arguments_and_profiles(ros2_launch: Ros2Launch) -> None:
     required = ROVER.replace("{default: 0.3, description", "{type: float, description")
     file = ros2_launch.write("rover.tfc.yaml", required)
     launch = ros2_launch(file, "--show-args")
     assert launch.process.wait() == 0
     launch.close()
-    shown = " ".join(launch.output.split())
-    assert "error" not in shown
-    assert "'height': how high the lidar is 'mode'" in shown
-    assert "'mode': One of: ['fast', 'slow'] (default: 'fast')" in shown
-    assert "'demo': apply the profile demo (default: 'false')" in shown
+    output = " ".join(launch.output.split())
+    assert "error" not in output
+    assert "'height': how high the lidar is 'mode'" in output
+    assert "'mode': One of: ['fast', 'slow'] (default: 'fast')" in output
+    assert "'demo': apply the profile demo (default: 'false')" in output
 
 
 @pytest.mark.parametrize(
@@ -118,9 +248,9 @@ def test_findings_end_launch_and_are_printed_once(
 def test_files_of_other_names_are_refused(ros2_launch: Ros2Launch) -> None:
     file = ros2_launch.write("other.yaml", ROVER)
     code = "from tfcompose.tools.ros2.frontend import RobotFileParser as Parser; "
-    other = processes.run([sys.executable, "-c", f"{code}Parser.load(open({str(file)!r}))"])
-    assert "ValueError" in other.stderr
-    assert "other.yaml" in other.stderr
+    done = processes.run([sys.executable, "-c", f"{code}Parser.load(open({str(file)!r}))"])
+    assert "ValueError" in done.stderr
+    assert "other.yaml" in done.stderr
 
 
 @pytest.mark.parametrize("language", ["xml", "yaml"])
@@ -204,7 +334,7 @@ def test_actions_wait_for_the_tree_and_a_required_end_is_an_event(
     assert all(map(gone, below))
 
 
-def test_a_guard_alone_watches_nodes_that_keep_their_launch_file_and_one_hands_its_edge_over(
+def test_a_lone_guard_watches_launched_nodes_and_one_hands_its_edge_over(
     ros2_launch: Ros2Launch, domain: Domain
 ) -> None:
     folder = ros2_launch.folder

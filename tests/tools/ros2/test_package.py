@@ -55,7 +55,7 @@ def test_versions_and_descriptions_are_one() -> None:
     )
 
 
-def test_it_depends_on_what_pip_installs_and_on_what_the_code_imports_of_ros() -> None:
+def test_it_depends_on_pip_packages_and_the_ros_imports_of_the_code() -> None:
     names = [Requirement(text).name for text in PROJECT["dependencies"]]
     installed = {KEYS.get(name, f"python3-{name}") for name in names}
     ours = {*sys.stdlib_module_names, "tfcompose", *_python_packages()}

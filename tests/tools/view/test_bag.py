@@ -123,17 +123,17 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         panel = Panel(server, session, edit=False, joints=False)
         recorded = Recorded(str(bag), [GLOBAL])
         tree = BagTree(session.robot, plan_of(session.robot), recorded, TOLERANCE)
-        shown = show_recording(server, panel, tree, recorded.length_s)
+        view = show_recording(server, panel, tree, recorded.length_s)
         assert body_pose(panel.scene, "base_link").xyz == (
             0,
             0,
             0,
         ), "the robot stays in the picture"
-        shown.tree.fixed = "odom"
+        view.tree.fixed = "odom"
         for at_s in (8.0, 3.0):
-            shown.time.value = at_s
+            view.time.value = at_s
             assert body_pose(panel.scene, "base_link").xyz[0] == pytest.approx(at_s)
-        shown.fixed.value = "mast"
+        view.fixed.value = "mast"
         later = Panel(server, session, edit=False, joints=False, choices=panel.choices)
         assert show_recording(server, later, tree, recorded.length_s).fixed.value == "mast", (
             "it outlives a reload"
@@ -142,9 +142,13 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         stop_server(server)
 
 
-@pytest.mark.parametrize("at", ["10.5", "-1", "x", f"{START_S - 1}"])
-def test_a_time_outside_of_the_recording_is_refused(at: str, bag: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("time_text", ["10.5", "-1", "x", f"{START_S - 1}"])
+def test_a_time_outside_of_the_recording_is_refused(
+    time_text: str, bag: Path, tmp_path: Path
+) -> None:
     (tmp_path / "r.yaml").write_text(TEXT, "utf-8")
-    done = tfcompose_in(tmp_path, "view", "r.yaml", "--bag", str(bag), "--at", at, "--port", "0")
+    done = tfcompose_in(
+        tmp_path, "view", "r.yaml", "--bag", str(bag), "--at", time_text, "--port", "0"
+    )
     assert done.returncode == 2
     assert "--at" in done.stderr

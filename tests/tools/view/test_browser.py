@@ -86,7 +86,9 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
             (client,) = server.get_clients().values()
             canvas = page.locator("canvas").first.bounding_box()
             assert canvas
-            tip, on = (pixel(client, before @ Pose((0, 0, at)), canvas["x"]) for at in (0.2, 0.3))
+            tip, on = (
+                pixel(client, before @ Pose((0, 0, height)), canvas["x"]) for height in (0.2, 0.3)
+            )
             page.mouse.move(*tip)
             page.wait_for_timeout(200)
             page.mouse.down()
@@ -108,7 +110,9 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
     assert after.quat_xyzw == pytest.approx(before.quat_xyzw)
     assert off.xyz == pytest.approx((0, 0, 0.1), abs=0.01)
     old, new = ROVER.read_text("utf-8").splitlines(), rover.read_text("utf-8").splitlines()
-    (changed,) = [(line, other) for line, other in zip(old, new, strict=True) if line != other]
+    (changed,) = [
+        (line, new_line) for line, new_line in zip(old, new, strict=True) if line != new_line
+    ]
     assert changed[0].partition("#")[2] == changed[1].partition("#")[2] != ""
     assert changed[1].split("#")[0].strip() == f"xyz: [{after.xyz[0]:g}, 0.0475, {after.xyz[2]:g}]"
     assert tfcompose_in(rover.parent, "lint", rover.name).returncode == 0
@@ -279,8 +283,8 @@ def test_a_tree_of_hundreds_of_frames_stays_where_it_was_scrolled_to(
 ) -> None:
     names = ["<i>&'\"", *(f"f{number}" for number in range(300))]
     frames = "".join(
-        f"  {json.dumps(name)}: {{parent: base, xyz: [{at}, 0, 0]}}\n"
-        for at, name in enumerate(names)
+        f"  {json.dumps(name)}: {{parent: base, xyz: [{index}, 0, 0]}}\n"
+        for index, name in enumerate(names)
     )
     (tmp_path / "r.yaml").write_text(
         f"tfcompose: 1\nrobot: r\nframes:\n  base: {{}}\n{frames}", "utf-8"
@@ -300,7 +304,7 @@ def test_a_tree_of_hundreds_of_frames_stays_where_it_was_scrolled_to(
         assert not in_view(page, "f250")
 
 
-def test_the_window_has_the_robots_name_all_of_frames_names_and_named_views(
+def test_the_window_has_the_robots_name_all_frame_names_and_named_views(
     tmp_path: Path, server: viser.ViserServer
 ) -> None:
     frame = "wrist_camera_depth_optical_frame_of_the_second_arm"

@@ -40,7 +40,7 @@ def test_fields_of_view_are_in_the_first_picture(server: viser.ViserServer) -> N
     assert np.linalg.norm(ends - bounds.middle, axis=1).max() <= bounds.radius
 
 
-def test_a_mount_that_cannot_be_edited_is_grey_and_the_distance_of_two_frames_is_shown(
+def test_a_fixed_mount_is_grey_and_the_distance_of_two_frames_is_shown(
     rover: Path, server: viser.ViserServer
 ) -> None:
     panel = Panel(server, session_of(rover), edit=True)

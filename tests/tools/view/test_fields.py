@@ -99,4 +99,4 @@ def test_a_field_of_view_is_where_its_frame_is(server: viser.ViserServer) -> Non
     fields.update(poses)
     ((_, optics),) = streams(robot)
     assert fields.pose(0) == poses[optics.frame] != Pose()
-    assert fields.shown == {"s": True}
+    assert fields.visible == {"s": True}

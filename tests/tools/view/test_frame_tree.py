@@ -76,7 +76,7 @@ def test_a_search_leaves_what_it_finds_and_all_above_open(search: str, rows: lis
     assert drawn(tree_of(ARM), {"odom": False, "mast": False}, search) == rows
 
 
-def test_of_many_frames_complete_levels_are_open_and_a_selected_one_is_among_the_rows() -> None:
+def test_many_frames_open_by_complete_levels_and_show_the_selected_one() -> None:
     numbers = random.Random(5)
     parents = {
         "f0": "",
@@ -111,17 +111,17 @@ def test_frames_of_a_loop_or_below_an_unknown_one_have_rows_too(parents: dict[st
 
 def test_all_below_a_hidden_frame_is_hidden_until_it_is_shown_itself() -> None:
     tree = tree_of(ARM)
-    chosen = tree.show("base_link", {}, shown=False)
+    chosen = tree.show("base_link", {}, is_visible=False)
     assert tree.hidden_frames(chosen) == ARM.keys() - {"odom"}
-    chosen = tree.show("arm", chosen, shown=True)
+    chosen = tree.show("arm", chosen, is_visible=True)
     assert tree.hidden_frames(chosen) == {"base_link", "mast", "lidar"}
-    chosen = tree.show("base_link", chosen, shown=True)
+    chosen = tree.show("base_link", chosen, is_visible=True)
     assert chosen == {}
     assert not tree.hidden_frames(chosen)
 
 
 def test_a_frame_that_comes_below_a_hidden_one_is_hidden_too() -> None:
-    chosen = tree_of(ARM).show("mast", {"gone": False}, shown=False)
+    chosen = tree_of(ARM).show("mast", {"gone": False}, is_visible=False)
     assert tree_of({**ARM, "camera": "lidar", "gone": "odom"}).hidden_frames(chosen) == {
         "mast",
         "lidar",

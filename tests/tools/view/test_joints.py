@@ -28,13 +28,15 @@ ROBOT = robot_of(TWO)
 class Topic:
     """A topic that a sender uses, and who else does."""
 
-    others: list[str] = field(default_factory=list)
+    other_nodes: list[str] = field(default_factory=list)
     sent: list[tuple[int, list[float]]] = field(default_factory=list)
     publishers: int = 0
 
     @property
     def sender(self) -> JointSender:
-        return JointSender("/joint_states", {"w": "w", "o": "o"}, self.make, lambda: self.others)
+        return JointSender(
+            "/joint_states", {"w": "w", "o": "o"}, self.make, lambda: self.other_nodes
+        )
 
     def make(self) -> "Topic":
         self.publishers += 1
@@ -63,7 +65,7 @@ def test_it_refuses_where_somebody_publishes_and_names_who() -> None:
     sender = topic.sender
     for tick in range(100):
         sender.step(tick / 10, 1, ROBOT, {})
-    assert (sender.state, sender.others_found, topic.sent) == ("refused", ("/jsp",), [])
+    assert (sender.state, sender.publishers_found, topic.sent) == ("refused", ("/jsp",), [])
     assert "/jsp" in sender.text
 
 
@@ -73,15 +75,15 @@ def test_it_stops_when_somebody_comes_and_stays_so_when_they_leave() -> None:
     for tick in range(30):
         sender.step(tick / 10, 1, ROBOT, {})
     assert topic.sent
-    topic.others, before = ["nobody knows"], len(topic.sent)
+    topic.other_nodes, before = ["nobody knows"], len(topic.sent)
     sender.step(3.0, 1, ROBOT, {})
-    topic.others = ["/arm_driver"]
+    topic.other_nodes = ["/arm_driver"]
     for tick in range(30, 60):
         sender.step(tick / 10, 1, ROBOT, {})
     assert len(topic.sent) - before <= 3
     assert (sender.state, topic.publishers) == ("stopped", 0)
     assert "/arm_driver" in sender.text
-    topic.others, before = [], len(topic.sent)
+    topic.other_nodes, before = [], len(topic.sent)
     for tick in range(60, 90):
         sender.step(tick / 10, 1, ROBOT, {})
     assert len(topic.sent) == before
@@ -95,7 +97,7 @@ def test_nothing_is_sent_without_a_time() -> None:
     assert not topic.sent
 
 
-def test_positions_go_where_the_plans_processes_take_them_by_their_own_names() -> None:
+def test_positions_go_to_the_plans_processes_by_their_own_names() -> None:
     text = ROVER.with_name("two_rovers.yaml").read_text("utf-8")
     file = str(ROVER.with_name("two_rovers.yaml"))
     robot = compile_robot(

@@ -91,7 +91,7 @@ class Live:
             )
 
 
-def test_frames_are_where_they_are_published_and_the_rest_where_the_robot_says() -> None:
+def test_frames_are_at_published_poses_and_the_rest_as_in_the_robot() -> None:
     live = Live()
     live.send(DRIVE, 0.0, ("odom", "base_link", Pose((3, 0, 0), quat_from_rpy(0, 0, math.pi / 2))))
     picture = live.tree.next_picture()
@@ -119,7 +119,7 @@ def test_a_right_tree_has_neither_findings_nor_ghosts() -> None:
     assert (picture.ghosts, picture.wrong, picture.further) == ({}, (), {})
 
 
-def test_what_is_off_by_more_than_the_tolerance_has_a_ghost_with_all_below_it() -> None:
+def test_a_frame_beyond_the_tolerance_has_a_ghost_with_its_subtree() -> None:
     live = Live()
     live.run(mast=Pose((0, 0, 0.6)))
     judgement = live.tree.judge(FOUND_S)
@@ -140,9 +140,7 @@ def test_what_is_off_by_less_has_none() -> None:
     assert not live.tree.judge(FOUND_S).off
 
 
-def test_a_joint_that_moves_is_not_off_and_one_at_another_place_keeps_its_angle_in_the_ghost() -> (
-    None
-):
+def test_a_moving_joint_is_not_off_and_a_misplaced_one_keeps_its_angle() -> None:
     live, angle = Live(), quat_from_rpy(0, 1, 0)
     live.run(wheel=Pose((0, 0.2, 0), angle))
     assert not live.tree.judge(FOUND_S).off
@@ -210,8 +208,8 @@ def test_a_silence_that_is_over_is_red_for_some_seconds_only(silence_s: float) -
         return begun_s + seconds
 
     at_s = send(OVER_S - 0.5, 8.0 + silence_s)
-    [found] = live.tree.judge(at_s).findings
-    assert found.code == "TF804"
+    [finding] = live.tree.judge(at_s).findings
+    assert finding.code == "TF804"
     assert live.tree.judgement.wrong == {"base_link"}
     at_s = send(1.0, at_s)
     assert not live.tree.judge(at_s).findings
@@ -312,11 +310,11 @@ def test_poses_in_roots_are_those_of_the_tree_walked_edge_by_edge() -> None:
         for frame in frames
     }
     forest = FrameForest(frames, parents)
-    found = forest.in_roots(np.array([row_of(poses[frame]) for frame in frames]))
-    for frame, row in zip(frames, found.tolist(), strict=True):
-        expected, at = Pose(), frame
-        while at in parents:
-            expected, at = poses[at] @ expected, parents[at]
+    rows = forest.in_roots(np.array([row_of(poses[frame]) for frame in frames]))
+    for frame, row in zip(frames, rows.tolist(), strict=True):
+        expected, ancestor = Pose(), frame
+        while ancestor in parents:
+            expected, ancestor = poses[ancestor] @ expected, parents[ancestor]
         off = offset_of(expected, pose_of(row))
         assert max(off) < 1e-7
 

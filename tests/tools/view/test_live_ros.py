@@ -46,7 +46,7 @@ class View:
 
     @property
     def judgement(self) -> Judgement:
-        return self.following.shown[self.windows.panels[0]].tree.judgement
+        return self.following.windows_by_panel[self.windows.panels[0]].tree.judgement
 
     @property
     def is_red(self) -> bool:
@@ -63,7 +63,7 @@ joints: {w: {type: continuous, parent: base_link, child: wheel, xyz: [0, 0.2, 0]
 
 @contextmanager
 def following(
-    session: Session, *, joints: bool = False, in_browser: bool = False
+    session: Session, *, joints: bool = False, edit: bool = False, in_browser: bool = False
 ) -> Iterator[View]:
     """Show the robot that runs in the test's domain, in a window of its own or a browser's."""
     files, changed = WatchedFiles(lambda path: Path(path).read_text("utf-8")), threading.Event()
@@ -71,7 +71,7 @@ def following(
         files(file)
     server, ending = start_server("127.0.0.1", 0, "test", TOKEN), Stop()
     observers = observers_of(plan_of(session.robot))
-    follows = LiveSource(observers, Offset(1e-3, 1e-3), joints=joints)
+    follows = LiveSource(observers, Offset(1e-3, 1e-3), joints=joints, edit=edit)
     windows = Windows(server, session, files, follows)
     if not in_browser:
         windows.add(server, 0)
@@ -90,18 +90,20 @@ def view(tmp_path: Path) -> Iterator[View]:
     """A view that follows the tree of a rover whose owners are the test's."""
     file = tmp_path / "rover.yaml"
     file.write_text(EXTERNAL, "utf-8")
-    with following(session_of(file)) as shown:
-        yield shown
+    with following(session_of(file)) as opened:
+        yield opened
 
 
 def test_two_windows_choose_for_themselves(view: View) -> None:
     second = start_server("127.0.0.1", 0, "second", TOKEN)
     try:
         view.windows.add(second, 1)
-        first, other = (shown.panel for shown in view.windows.panels)
-        first.tree.select("lidar")
-        assert (first.selected, other.selected) == ("lidar", "odom")
-        in_first, in_other = (view.following.shown[panel] for panel in view.windows.panels)
+        first_panel, second_panel = (window.panel for window in view.windows.panels)
+        first_panel.tree.select("lidar")
+        assert (first_panel.selected, second_panel.selected) == ("lidar", "odom")
+        in_first, in_other = (
+            view.following.windows_by_panel[panel] for panel in view.windows.panels
+        )
         in_first.panel.fixed.value = "lidar"
         assert until(lambda: in_first.tree.fixed == "lidar")
         assert in_other.tree.fixed != "lidar"
@@ -126,8 +128,8 @@ def pose_in(buffer: Any, parent: str, child: str) -> Pose | None:
 
     if not buffer.can_transform(parent, child, Time()):
         return None
-    found = buffer.lookup_transform(parent, child, Time()).transform
-    xyz, quat = found.translation, found.rotation
+    transform = buffer.lookup_transform(parent, child, Time()).transform
+    xyz, quat = transform.translation, transform.rotation
     return Pose((xyz.x, xyz.y, xyz.z), (quat.x, quat.y, quat.z, quat.w))
 
 
@@ -146,8 +148,8 @@ def test_frames_are_where_a_tf_listener_has_them(view: View, nodes: Any) -> None
             pose = pose_in(buffer, "odom", "lidar")
             if pose is None or panel.published is None:
                 return False
-            shown = panel.published["odom"].inverse() @ panel.published["lidar"]
-            return pose.xyz != (0, 0, 0.3) and max(offset_of(pose, shown)) < 1e-6
+            displayed = panel.published["odom"].inverse() @ panel.published["lidar"]
+            return pose.xyz != (0, 0, 0.3) and max(offset_of(pose, displayed)) < 1e-6
 
         assert until(is_there)
 
@@ -178,7 +180,7 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(view: View, nodes:
     assert in_one_of_a_few(is_found)
 
 
-def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_moves_it(
+def test_a_slider_moves_the_wheel_on_tf_until_another_node_moves_it(
     tmp_path: Path, start: Callable[..., Any], nodes: Any
 ) -> None:
     from sensor_msgs.msg import JointState  # noqa: PLC0415 (as above)
@@ -192,10 +194,10 @@ def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_mo
             pose = pose_in(buffer, "base_link", "wheel")
             if pose is None or view.panel.published is None:
                 return False
-            shown = view.panel.published["wheel"]
+            displayed = view.panel.published["wheel"]
             return (
-                pose.xyz == shown.xyz == (0, 0.2, 0)
-                and pose.rpy[1] == pytest.approx(expected) == shown.rpy[1]
+                pose.xyz == displayed.xyz == (0, 0.2, 0)
+                and pose.rpy[1] == pytest.approx(expected) == displayed.rpy[1]
             )
 
         view.panel.set_joint("w", angle)
@@ -207,7 +209,7 @@ def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_mo
             lambda _: JointState(name=["w"], position=[-0.5]),
         )
         assert until(lambda: [sender.state for sender in view.following.senders] == ["stopped"])
-        assert until(lambda: view.following.senders[0].others_found == ("/jsp",))
+        assert until(lambda: view.following.senders[0].publishers_found == ("/jsp",))
 
 
 def test_a_file_that_changes_is_followed_from_then_on(
@@ -226,7 +228,7 @@ def test_a_file_that_changes_is_followed_from_then_on(
     assert until(lambda: view.server.scene.get_handle_by_name("/ghost/2") is not None)
     (tmp_path / "rover.yaml").write_text(EXTERNAL + "  odom2: [\n", "utf-8")
     view.changed.set()
-    assert until(lambda: "TF" in view.windows.panels[0].found)
+    assert until(lambda: "TF" in view.windows.panels[0].report)
     (tmp_path / "rover.yaml").write_text(EXTERNAL, "utf-8")
     view.changed.set()
-    assert until(lambda: not view.judgement.findings and not view.windows.panels[0].found)
+    assert until(lambda: not view.judgement.findings and not view.windows.panels[0].report)

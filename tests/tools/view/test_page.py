@@ -40,10 +40,10 @@ def arm_page(folder: Path, text: str) -> str:
 
 def rows(page: Page) -> list[str]:
     """Return the frames that have a row, from top to bottom."""
-    found = page.locator("[data-frame]:visible").evaluate_all(
+    frames = page.locator("[data-frame]:visible").evaluate_all(
         "rows => rows.map(row => row.dataset.frame)"
     )
-    return [str(frame) for frame in found]
+    return [str(frame) for frame in frames]
 
 
 def place_of(page: Page, frame: str) -> tuple[float, float]:

@@ -32,7 +32,7 @@ BROKEN = {
 
 
 @pytest.fixture
-def shown(tmp_path: Path) -> Iterator[ReloadedPanel]:
+def reloaded(tmp_path: Path) -> Iterator[ReloadedPanel]:
     (tmp_path / "r.yaml").write_text(TEXT, "utf-8")
     (tmp_path / "more.yaml").write_text(
         "frames: {mast: {parent: base_link, xyz: [0, 0, 2]}}\n", "utf-8"
@@ -46,9 +46,11 @@ def shown(tmp_path: Path) -> Iterator[ReloadedPanel]:
     stop_server(server)
 
 
-def reload(shown: ReloadedPanel) -> bool:
+def reload(reloaded: ReloadedPanel) -> bool:
     """Read the files again; return whether the panel is a new one."""
-    return shown.files.differ() and shown.accept(*shown.session.read_again(shown.files))
+    return reloaded.files.differ() and reloaded.accept(
+        *reloaded.session.read_again(reloaded.files)
+    )
 
 
 def replace(path: Path, text: str) -> None:
@@ -59,88 +61,88 @@ def replace(path: Path, text: str) -> None:
 
 
 def test_a_changed_file_is_shown_and_what_the_user_chose_stays(
-    shown: ReloadedPanel, tmp_path: Path
+    reloaded: ReloadedPanel, tmp_path: Path
 ) -> None:
-    shown.panel.tree.select("tool")
-    shown.panel.set_joint("j", 0.5)
+    reloaded.panel.tree.select("tool")
+    reloaded.panel.set_joint("j", 0.5)
     replace(
         tmp_path / "r.yaml",
         TEXT.replace("[1, 0, 0]}}", "[1, 0, 0]}, hook: {parent: tool, xyz: [0, 0, 1]}}"),
     )
-    assert reload(shown)
-    assert "hook" in shown.panel.poses()
-    assert shown.panel.selected == "tool"
-    assert shown.panel.positions == {"j": 0.5}
-    assert not reload(shown)
+    assert reload(reloaded)
+    assert "hook" in reloaded.panel.poses()
+    assert reloaded.panel.selected == "tool"
+    assert reloaded.panel.positions == {"j": 0.5}
+    assert not reload(reloaded)
 
 
-def test_what_was_hidden_opened_and_chosen_outlives_reloads_where_it_still_exists(
-    shown: ReloadedPanel, tmp_path: Path
+def test_hidden_open_and_selected_items_survive_reloads(
+    reloaded: ReloadedPanel, tmp_path: Path
 ) -> None:
     for owner in ("joints", "nobody"):
-        shown.panel.choices.owners[owner] = False
-    shown.panel.choices.is_open["arm"] = False
-    shown.panel.choices.base = "mast"
-    shown.panel.tree.show("arm", shown=False)
-    shown.panel.tree.select("mast")
-    shown.panel.tree.search("a")
+        reloaded.panel.choices.owners[owner] = False
+    reloaded.panel.choices.is_open["arm"] = False
+    reloaded.panel.choices.base = "mast"
+    reloaded.panel.tree.show("arm", is_visible=False)
+    reloaded.panel.tree.select("mast")
+    reloaded.panel.tree.search("a")
     replace(
         tmp_path / "r.yaml", TEXT.replace("tool:", "hook: {parent: arm, xyz: [0, 1, 0]}, tool:")
     )
-    assert reload(shown)
-    assert shown.panel.tree.hidden == {"arm", "tool", "hook"}
-    assert shown.panel.selected == "mast"
-    assert shown.panel.choices.base == "mast"
-    assert shown.panel.choices.search == "a"
-    assert not shown.panel.tree.tree.is_open("arm", shown.panel.choices.is_open)
-    assert not is_owner_shown(shown.panel.scene, "joints")
-    assert is_owner_shown(shown.panel.scene, "static")
+    assert reload(reloaded)
+    assert reloaded.panel.tree.hidden == {"arm", "tool", "hook"}
+    assert reloaded.panel.selected == "mast"
+    assert reloaded.panel.choices.base == "mast"
+    assert reloaded.panel.choices.search == "a"
+    assert not reloaded.panel.tree.tree.is_open("arm", reloaded.panel.choices.is_open)
+    assert not is_owner_shown(reloaded.panel.scene, "joints")
+    assert is_owner_shown(reloaded.panel.scene, "static")
     (tmp_path / "more.yaml").write_text("{}\n", "utf-8")
-    assert reload(shown)
-    assert shown.panel.selected == "base_link"
-    assert shown.panel.tree.hidden == {"arm", "tool", "hook"}
+    assert reload(reloaded)
+    assert reloaded.panel.selected == "base_link"
+    assert reloaded.panel.tree.hidden == {"arm", "tool", "hook"}
 
 
-def test_an_included_file_is_one_of_the_robots(shown: ReloadedPanel, tmp_path: Path) -> None:
+def test_an_included_file_is_one_of_the_robots(reloaded: ReloadedPanel, tmp_path: Path) -> None:
     replace(tmp_path / "more.yaml", "frames: {mast: {parent: base_link, xyz: [0, 0, 3]}}\n")
-    assert reload(shown)
-    assert shown.panel.poses()["mast"].xyz == (0, 0, 3)
+    assert reload(reloaded)
+    assert reloaded.panel.poses()["mast"].xyz == (0, 0, 3)
 
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_file_leaves_the_last_good_scene_and_is_found_wrong(
-    name: str, shown: ReloadedPanel, tmp_path: Path
+    name: str, reloaded: ReloadedPanel, tmp_path: Path
 ) -> None:
-    before, panel = shown.panel.poses(), shown.panel
+    before, panel = reloaded.panel.poses(), reloaded.panel
     replace(tmp_path / "r.yaml", BROKEN[name])
-    assert not reload(shown)
-    assert shown.panel is panel
-    assert shown.panel.poses() == before
-    assert "TF" in shown.found
+    assert not reload(reloaded)
+    assert reloaded.panel is panel
+    assert reloaded.panel.poses() == before
+    assert "TF" in reloaded.report
     replace(tmp_path / "r.yaml", TEXT.replace("[1, 0, 0]}}", "[2, 0, 0]}}"))
-    assert reload(shown)
-    assert not shown.found
+    assert reload(reloaded)
+    assert not reloaded.report
 
 
-def test_a_file_that_is_gone_leaves_the_scene(shown: ReloadedPanel, tmp_path: Path) -> None:
+def test_a_file_that_is_gone_leaves_the_scene(reloaded: ReloadedPanel, tmp_path: Path) -> None:
     (tmp_path / "r.yaml").unlink()
-    assert not reload(shown)
-    assert shown.found
+    assert not reload(reloaded)
+    assert reloaded.report
 
 
-def test_a_mesh_that_is_changed_is_read_again(shown: ReloadedPanel, tmp_path: Path) -> None:
+def test_a_mesh_that_is_changed_is_read_again(reloaded: ReloadedPanel, tmp_path: Path) -> None:
     for number, radius in enumerate((1.0, 2.0)):
         trimesh.creation.icosphere(subdivisions=1, radius=radius).export(tmp_path / "tip.stl")
         if number == 0:
             replace(tmp_path / "r.yaml", TEXT.replace("arm: {}", "arm: {visual: {mesh: tip.stl}}"))
-        until(lambda: reload(shown))
-        least, most = shown.panel.scene.bounds("arm")
+        until(lambda: reload(reloaded))
+        least, most = reloaded.panel.scene.bounds("arm")
         assert [*least, *most] == pytest.approx([-radius] * 3 + [radius] * 3, rel=0.2)
-    assert not reload(shown)
+    assert not reload(reloaded)
 
 
 def test_a_preset_of_the_robot_that_is_changed_is_read_again(
-    shown: ReloadedPanel, tmp_path: Path
+    reloaded: ReloadedPanel, tmp_path: Path
 ) -> None:
     preset = tmp_path / "presets" / "own" / "eye.yaml"
     preset.parent.mkdir(parents=True)
@@ -152,51 +154,51 @@ def test_a_preset_of_the_robot_that_is_changed_is_read_again(
         " 0]}}\n"
     )
     replace(tmp_path / "r.yaml", TEXT + sensor)
-    assert reload(shown), shown.found
+    assert reload(reloaded), reloaded.report
     for x in (2, 3):
         replace(preset, text % x)
-        assert reload(shown), shown.found
-        edge = shown.session.robot.parent_edge("e_lens")
+        assert reload(reloaded), reloaded.report
+        edge = reloaded.session.robot.parent_edge("e_lens")
         assert edge
         assert edge.pose.xyz == (x, 0, 0)
-    assert not reload(shown)
+    assert not reload(reloaded)
 
 
-def test_a_save_is_no_change_on_disk(shown: ReloadedPanel) -> None:
-    shown.panel.tree.select("tool")
-    shown.panel.move(Pose((3, 0, 0)))
-    shown.panel.save()
-    assert "saved" in shown.panel.report.content
-    assert not reload(shown)
+def test_a_save_is_no_change_on_disk(reloaded: ReloadedPanel) -> None:
+    reloaded.panel.tree.select("tool")
+    reloaded.panel.move(Pose((3, 0, 0)))
+    reloaded.panel.save()
+    assert "saved" in reloaded.panel.report.content
+    assert not reload(reloaded)
 
 
-def test_moves_of_frames_that_stay_are_kept(shown: ReloadedPanel, tmp_path: Path) -> None:
-    shown.session.move("tool", Pose((3, 0, 0)))
-    shown.session.move("mast", Pose((4, 0, 0)))
+def test_moves_of_frames_that_stay_are_kept(reloaded: ReloadedPanel, tmp_path: Path) -> None:
+    reloaded.session.move("tool", Pose((3, 0, 0)))
+    reloaded.session.move("mast", Pose((4, 0, 0)))
     replace(tmp_path / "more.yaml", "{}\n")
-    assert reload(shown)
-    assert shown.session.moved == {"tool": Pose((3, 0, 0))}
+    assert reload(reloaded)
+    assert reloaded.session.moved == {"tool": Pose((3, 0, 0))}
 
 
-def test_the_watcher_sees_changes_of_all_files_and_of_those_that_come_later(
-    shown: ReloadedPanel, tmp_path: Path
+def test_the_watcher_reports_changes_of_all_files_including_later_ones(
+    reloaded: ReloadedPanel, tmp_path: Path
 ) -> None:
     (tmp_path / "sub").mkdir()
-    with Watcher(shown.files) as watcher:
+    with Watcher(reloaded.files) as watcher:
         (tmp_path / "other.txt").write_text("x", "utf-8")
         replace(tmp_path / "r.yaml", TEXT.replace("more.yaml", "sub/more.yaml"))
         assert until(watcher.changed.is_set)
         watcher.changed.clear()
-        assert not reload(shown)
+        assert not reload(reloaded)
         replace(
             tmp_path / "sub" / "more.yaml", "frames: {mast: {parent: base_link, xyz: [0, 0, 5]}}\n"
         )
         assert until(watcher.changed.is_set)
-        assert until(lambda: reload(shown))
-    assert shown.panel.poses()["mast"].xyz == (0, 0, 5)
+        assert until(lambda: reload(reloaded))
+    assert reloaded.panel.poses()["mast"].xyz == (0, 0, 5)
 
 
-def test_a_robot_that_was_wrong_from_the_begin_is_shown_again_while_it_is_wrong(
+def test_a_robot_wrong_from_the_start_is_shown_again_while_it_is_wrong(
     tmp_path: Path,
 ) -> None:
     wrong = TEXT.replace("parent: arm,", "parent: amr,").replace("include: [more.yaml]\n", "")
@@ -206,10 +208,10 @@ def test_a_robot_that_was_wrong_from_the_begin_is_shown_again_while_it_is_wrong(
     session = session_of(str(file), parser_of("view").parse_args([str(file)]), files)
     server = start_server("127.0.0.1", 0, "test", TOKEN)
     try:
-        other = ReloadedPanel(server, session, files, edit=False, joints=False)
+        reloaded = ReloadedPanel(server, session, files, edit=False, joints=False)
         replace(file, wrong.replace("[0, 0, 1], axis", "[0, 0, 2], axis"))
-        assert reload(other)
-        assert other.panel.poses()["arm"].xyz == (0, 0, 2)
-        assert "TF" in other.found
+        assert reload(reloaded)
+        assert reloaded.panel.poses()["arm"].xyz == (0, 0, 2)
+        assert "TF" in reloaded.report
     finally:
         stop_server(server)

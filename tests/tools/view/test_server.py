@@ -119,13 +119,13 @@ def test_bytes_that_are_no_message_end_one_connection_without_a_traceback(
     data: bytes | str, server: viser.ViserServer, capfd: pytest.CaptureFixture[str]
 ) -> None:
     query = f"?token={TOKEN}"
-    with opened(server.get_port(), query) as other:
+    with opened(server.get_port(), query) as second_connection:
         with opened(server.get_port(), query) as connection:
             connection.send(data)
             with pytest.raises(ConnectionClosed):
                 receive_to_the_end(connection)
-        assert len(other.recv(timeout=20)) > 0
-        other.ping().wait(20)
+        assert len(second_connection.recv(timeout=20)) > 0
+        second_connection.ping().wait(20)
     assert "Traceback" not in capfd.readouterr().err
 
 

@@ -104,32 +104,34 @@ def test_the_gizmo_is_where_a_typed_pose_puts_the_mount(
 
 def test_undo_and_redo_lead_over_a_save(rover: Path) -> None:
     session, text = session_of(rover), rover.read_text("utf-8")
-    child, other = (session.mount(frame).edge.child for frame in ("front_link", "rear_link"))
-    first, second = (session.mount(frame).edge.pose for frame in (child, other))
+    child, second_frame = (
+        session.mount(frame).edge.child for frame in ("front_link", "rear_link")
+    )
+    first, second = (session.mount(frame).edge.pose for frame in (child, second_frame))
     session.move(child, Pose((1, 0, 0)))
-    session.move(other, Pose((2, 0, 0)))
+    session.move(second_frame, Pose((2, 0, 0)))
     assert session.save().diff
-    session.move(other, Pose((3, 0, 0)))
-    for pose, at in (
+    session.move(second_frame, Pose((3, 0, 0)))
+    for pose, expected in (
         (Pose((1, 0, 0)), Pose((2, 0, 0))),
         (Pose((1, 0, 0)), second),
         (first, second),
     ):
         assert session.undo()
         assert close(session.mount(child).edge.pose, pose)
-        assert close(session.mount(other).edge.pose, at)
+        assert close(session.mount(second_frame).edge.pose, expected)
     assert not session.undo()
     assert session.save().diff
     assert rover.read_text("utf-8").replace("0.3]", "0.30]") == text
     for _ in range(3):
         assert session.redo()
     assert close(session.mount(child).edge.pose, Pose((1, 0, 0)))
-    assert close(session.mount(other).edge.pose, Pose((3, 0, 0)))
+    assert close(session.mount(second_frame).edge.pose, Pose((3, 0, 0)))
 
 
-def close(pose: Pose, other: Pose) -> bool:
+def close(pose: Pose, expected: Pose) -> bool:
     """Return whether two poses are the same to a micrometre and a microradian."""
-    return max(offset_of(pose, other)) < 1e-6
+    return max(offset_of(pose, expected)) < 1e-6
 
 
 def test_what_a_variable_gives_is_not_saved_and_an_overlay_is_offered(rover: Path) -> None:
@@ -327,7 +329,7 @@ def test_axes_and_fields_of_view_grow_with_the_robot(
     assert (scene.scale, scene.fields.reach) == (scale, 0.5 * scale)
 
 
-def test_a_mesh_has_few_triangles_and_visual_ones_come_after_collision_shapes(
+def test_a_mesh_has_few_triangles_and_visuals_follow_collision_shapes(
     tmp_path: Path, server: viser.ViserServer
 ) -> None:
     trimesh.creation.icosphere(subdivisions=6).export(tmp_path / "heavy.stl")
@@ -415,8 +417,8 @@ def test_a_built_plan_is_shown_with_its_bodies_and_frames(rover: Path) -> None:
     assert bodies == {
         frame for frame, link in expected.links.items() if link.visuals or link.collisions
     }
-    there, here = poses_in_roots(robot, {}), poses_in_roots(expected, {})
-    assert all(max(offset_of(here[frame], pose)) < 1e-9 for frame, pose in there.items())
+    planned, compiled = poses_in_roots(robot, {}), poses_in_roots(expected, {})
+    assert all(max(offset_of(compiled[frame], pose)) < 1e-9 for frame, pose in planned.items())
     limits = {edge.joint.name: edge.joint.limit for edge in expected.edges if edge.joint}
     assert {edge.joint.name: edge.joint.limit for edge in robot.edges if edge.joint} == limits
 
@@ -436,11 +438,20 @@ def test_a_built_plan_is_not_edited(rover: Path) -> None:
     assert "built plan" in done.stderr
 
 
-@pytest.mark.parametrize("option", [("--edit",), ("--html", "r.html")])
-def test_a_running_tree_takes_neither_edit_nor_html(rover: Path, option: tuple[str, ...]) -> None:
-    done = tfcompose_in(rover.parent, "view", rover.name, "--live", *option)
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--live", "--html", "r.html"),
+        ("--bag", "run", "--html", "r.html"),
+        ("--bag", "run", "--edit"),
+    ],
+)
+def test_published_trees_give_no_page_and_a_recording_is_not_edited(
+    rover: Path, options: tuple[str, ...]
+) -> None:
+    done = tfcompose_in(rover.parent, "view", rover.name, *options)
     assert done.returncode == 2
-    assert done.stderr.startswith("tfcompose: --live")
+    assert done.stderr.startswith(f"tfcompose: {options[0]}")
     assert not (rover.parent / "r.html").exists()
 
 
@@ -475,7 +486,7 @@ def test_an_option_without_what_it_is_for_is_refused(words: list[str], tmp_path:
     assert not (tmp_path / "r.html").exists()
 
 
-def test_ctrl_c_while_the_scene_is_made_ends_the_view_without_another_error(
+def test_ctrl_c_during_scene_creation_ends_the_view_without_an_error(
     monkeypatch: pytest.MonkeyPatch, rover: Path
 ) -> None:
     def interrupted(*_: object, **__: object) -> None:

@@ -101,7 +101,7 @@ def test_two_windows_choose_for_themselves_and_save_one_after_the_other(
             assert third.session.moved == {"mast": Pose((0, 0, 5))}
 
 
-def test_all_windows_show_a_file_that_changed_and_later_ones_what_is_wrong_with_it(
+def test_all_windows_show_a_changed_file_and_later_ones_its_errors(
     windows: Windows, server: viser.ViserServer, tmp_path: Path
 ) -> None:
     file = tmp_path / "r.yaml"
@@ -112,11 +112,11 @@ def test_all_windows_show_a_file_that_changed_and_later_ones_what_is_wrong_with_
     ):
         file.write_text(TEXT.replace("[0, 0, 2]", "[0, 0, 7]"), "utf-8")
         windows.reload()
-        for shown in windows.panels:
-            assert shown.panel.poses()["mast"].xyz == (0, 0, 7)
+        for window in windows.panels:
+            assert window.panel.poses()["mast"].xyz == (0, 0, 7)
         file.write_text("tfcompose: [", "utf-8")
         windows.reload()
         with opened(chromium, server, windows):
-            for shown in windows.panels:
-                assert "TF002" in shown.found
-                assert shown.panel.poses()["mast"].xyz == (0, 0, 7)
+            for window in windows.panels:
+                assert "TF002" in window.report
+                assert window.panel.poses()["mast"].xyz == (0, 0, 7)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_file, add_robot_overlay, add_ros_args, add_variant
+from tfcompose.cli.options import add_file, add_ros_args, add_variant
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -18,7 +18,6 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_file(parser)
     add_variant(parser)
-    add_robot_overlay(parser)
     add_ros_args(parser)
     parser.add_argument("-o", "--output", metavar="DIR", help="default: build/ROBOT")
     parser.add_argument(

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
 SHELLS = ("bash", "zsh", "fish")
-#: bash appends the space; where nothing is known it lists no files.
+#: argcomplete's script switches ``nospace`` off where bash can, so bash appends the space. Without
+#: ``default``, bash lists no files when there are no completions.
 _BASH_OPTIONS = ("-o", "nospace")
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.model.robot import Edge, Robot
 
-#: Below these, two poses are one: a micrometre and 1e-6 rad.
+#: Two poses count as equal if they differ by less than these limits: a micrometre and 1e-6 rad.
 MOVED_M = 1e-6
 TURNED_RAD = 1e-6
 
@@ -41,7 +41,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 class Change(NamedTuple):
-    """Difference of a frame, or of the edge to its parent, ``A → B``."""
+    """A difference of a frame, or of the edge to its parent (``A → B``)."""
 
     change: str
     of: str
@@ -57,26 +57,29 @@ def run(arguments: Namespace) -> int:
 
     if (arguments.new is None) == (arguments.robots is None):
         fail("diff takes OLD NEW, or OLD --robots A B", UNREADABLE)
+    if arguments.robots and arguments.overlay_robot is not None:
+        fail("diff takes --robot NAME for both files, or --robots A B", UNREADABLE)
     sides = []
     for index in range(2):
         file = arguments.new if index and arguments.new else arguments.old
         side = copy(arguments)
-        side.overlay_robot = arguments.robots[index] if arguments.robots else None
+        if arguments.robots:
+            side.overlay_robot = arguments.robots[index]
         sides.append(compile_or_exit(file, side))
-    found = differences(*sides)
+    changes = differences(*sides)
     if arguments.format == "json":
         print(
             json.dumps(
-                [difference._asdict() for difference in found], indent=2, ensure_ascii=False
+                [difference._asdict() for difference in changes], indent=2, ensure_ascii=False
             )
         )
     else:
-        print("\n".join(map(str, found)) or "no difference between the two trees")
-    return int(bool(found))
+        print("\n".join(map(str, changes)) or "no difference between the two trees")
+    return int(bool(changes))
 
 
 def differences(old: Robot, new: Robot) -> list[Change]:
-    """Return the changes of each frame, in the new robot's order, removed ones last."""
+    """Return the changes of each frame in the new robot's order, then the removed frames."""
     before = {edge.child: edge for edge in old.edges}
     changes = [
         Change("root", frame, "is new")
@@ -96,12 +99,15 @@ def differences(old: Robot, new: Robot) -> list[Change]:
 def _changes(was: Edge, now: Edge) -> Iterator[Change]:
     if was.parent != now.parent:
         yield Change("parent", now.child, f"{was.parent} → {now.parent}")
-    far = norm(tuple(a - b for a, b in zip(was.pose.xyz, now.pose.xyz, strict=True)))
-    turned = angle_between(was.pose.quat_xyzw, now.pose.quat_xyzw)
+    before, after = was.mount, now.mount
+    far = norm(tuple(a - b for a, b in zip(before.xyz, after.xyz, strict=True)))
+    turned = angle_between(before.quat_xyzw, after.quat_xyzw)
     if was.parent == now.parent and (far > MOVED_M or turned > TURNED_RAD):
         yield Change("moved", now.name, f"{far * 1000:.3g} mm, {math.degrees(turned):.3g} deg")
+    if abs(_zero_offset(was) - _zero_offset(now)) > TURNED_RAD:
+        yield Change("offset", now.name, f"{_offset_text(was)} → {_offset_text(now)}")
     if set(was.switched) != set(now.switched):
-        yield Change("switch", now.name, f"{_others(was)} → {_others(now)}")
+        yield Change("switch", now.name, f"{_other_parents(was)} → {_other_parents(now)}")
     if was.owner != now.owner:
         yield Change("owner", now.name, f"{was.owner} → {now.owner}")
     if was.kind != now.kind:
@@ -110,7 +116,15 @@ def _changes(was: Edge, now: Edge) -> Iterator[Change]:
         yield Change("rate", now.name, f"{_hz(was.rate)} → {_hz(now.rate)}")
 
 
-def _others(edge: Edge) -> str:
+def _zero_offset(edge: Edge) -> float:
+    return edge.joint.zero_offset if edge.joint else 0.0
+
+
+def _offset_text(edge: Edge) -> str:
+    return edge.joint.zero_offset_text if edge.joint and edge.joint.zero_offset else "none"
+
+
+def _other_parents(edge: Edge) -> str:
     return f"or on {', '.join(edge.switched)}" if edge.switched else "no other parent"
 
 

@@ -14,7 +14,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_for, add_format, add_variant, namespace
+from tfcompose.cli.options import add_for, add_format, add_variant, changes_robot, namespace
 from tfcompose.cli.terminal import UNREADABLE, exit_code_of, fail, print_findings, printable
 from tfcompose.foundation.text import plural
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import Plan
 
-#: So many trees are named by their roots.
+#: Maximum number of trees whose roots a finding names.
 MOST_ROOTS = 6
 
 
@@ -47,7 +47,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Observe and print the findings.
 
-    Exit code 0 without findings, 1 with findings, 2 for wrong use.
+    Return 0 without findings, 1 with findings, 2 for wrong use.
     """
     from tfcompose.foundation.findings import finding
     from tfcompose.foundation.signals import Stop
@@ -67,7 +67,7 @@ def run(arguments: Namespace) -> int:
     plan = _plan(arguments)
     ros = plan.ros if plan else RosSettings()
     odd = (other_middleware(os.environ, ros), other_distro(os.environ, ros))
-    os.environ.update(child_environment(os.environ, ros, own=True))
+    os.environ.update(child_environment(os.environ, ros, is_built_in=True))
     trouble = ros_trouble(os.environ, ros)
     if trouble:
         return _print([trouble], arguments.format)
@@ -78,26 +78,26 @@ def run(arguments: Namespace) -> int:
 
     with Stop() as stop:
         try:
-            found = examine(
+            examined = examine(
                 observe(_expected_topics(plan, arguments.namespace), arguments.duration, stop)
             )
         except RosError as error:
             return _print([finding("TF901", str(error), None)], arguments.format)
         if stop.requested:
-            check_early_end(found.seconds, arguments.duration, heard=bool(found.edges))
-    findings = [*(finding for finding in odd if finding), *found.findings]
+            check_early_end(examined.seconds, arguments.duration, heard=bool(examined.edges))
+    findings = [*(finding for finding in odd if finding), *examined.findings]
     code = _print(findings, arguments.format)
     if arguments.format == "text":
-        observed = f"{plural(found.edges, 'edge')} from {plural(found.nodes, 'node')}"
+        observed = f"{plural(examined.edges, 'edge')} from {plural(examined.nodes, 'node')}"
         observed += (
-            f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
+            f" below {printable(', '.join(examined.roots[:MOST_ROOTS]))}" if examined.roots else ""
         )
-        print(f"observed {observed} for {found.seconds:.1f} s: {_summary(findings)}")
-        for cost in found.costs:
+        print(f"observed {observed} for {examined.seconds:.1f} s: {_summary(findings)}")
+        for cost in examined.costs:
             print(printable(cost))
-        if found.edges and found.elsewhere:
-            options = namespace_options(found.elsewhere)
-            print(f"TF is also on {', '.join(found.elsewhere[:MOST_ROOTS])}: {options}")
+        if examined.edges and examined.elsewhere:
+            options = namespace_options(examined.elsewhere)
+            print(f"TF is also on {', '.join(examined.elsewhere[:MOST_ROOTS])}: {options}")
     return code
 
 
@@ -119,23 +119,25 @@ def _summary(findings: list[Finding]) -> str:
 
 
 def _plan(arguments: Namespace) -> Plan | None:
-    """Return the given robot's plan, else the plan of the robot that runs here, if any.
+    """Return the plan of the robot on the command line, or of the robot that runs here.
+
+    Return None if neither exists.
 
     Raises:
-        SystemExit: after reporting its errors.
+        SystemExit: after the errors of the robot are printed.
     """
     from tfcompose.cli.plans import expected_plan
     from tfcompose.cli.runs import plan_of_domain
 
     if arguments.file is not None:
         return expected_plan(arguments.file, arguments)[0]
-    if arguments.profiles or arguments.overlays or arguments.settings or arguments.arg_values:
-        fail("--profile, --overlay, --set and NAME:=VALUE need a robot file", UNREADABLE)
+    if changes_robot(arguments):
+        fail("--profile, --robot, --overlay, --set and NAME:=VALUE need a robot file", UNREADABLE)
     return plan_of_domain()
 
 
 def _expected_topics(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
-    """Return the topics to observe, each pair with its part of the plan."""
+    """Return the pairs of topics to observe, each with its part of the plan."""
     from tfcompose.model.plan.topics import parts_of, topics_below
 
     topics = topics_below(below or "")

@@ -62,15 +62,15 @@ def _stop_leftovers(robot: str | None) -> int:
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
     runtime_dir = chosen_run(robot, "down --leftovers", among=lambda: runtime_dirs(os.environ))
-    found = [
+    remaining = [
         leftover for leftover in leftovers(f"{runtime_dir.name}:") if leftover.launcher is None
     ]
-    for leftover in found:
+    for leftover in remaining:
         print(f"stopping {leftover.pid}: {leftover.command}")
-    rest = end(found)
+    rest = end(remaining)
     for leftover in rest:
         warn(f"{leftover.pid} is still running: {leftover.command}")
     if rest:
         return FAILED
-    print(f"{len(found)} process{'' if len(found) == 1 else 'es'} of earlier runs stopped")
+    print(f"{len(remaining)} process{'' if len(remaining) == 1 else 'es'} of earlier runs stopped")
     return 0

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Pose
     from tfcompose.tf.live.pose_query import NoPose, OnPose, PoseQuery
 
-#: A stamp that is older is taken to be of another clock than the wall's.
+#: If a stamp is older than this, in seconds, it comes from another clock than the wall clock.
 _CLOCKS_AGREE_S = 1e6
-#: A double has no more.
+#: The number of significant digits of a double.
 _MOST_DIGITS = 15
 
 
@@ -74,7 +74,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.model.plan.topics import topics_below
     from tfcompose.tf.live.pose_query import PoseQuery
 
-    # tf2 takes a name with a slash before it for the name.
+    # tf2 ignores a slash before a name.
     arguments.a, arguments.b = (name.removeprefix("/") for name in (arguments.a, arguments.b))
     topics = topics_below(arguments.namespace)
     query = PoseQuery(
@@ -114,11 +114,11 @@ def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
     from tfcompose.tf.live.echo import echo
 
     begun = time.monotonic()
-    shown = False
+    has_pose = False
 
     def note(pose: Pose, stamp_ns: int | None) -> None:
-        nonlocal shown
-        shown = True
+        nonlocal has_pose
+        has_pose = True
         show(pose, stamp_ns)
 
     with Stop() as stop:
@@ -126,7 +126,7 @@ def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
             missed = echo(query, note, stop)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
-        if stop.requested and not shown and missed is None:
+        if stop.requested and not has_pose and missed is None:
             fail(
                 f"interrupted after {time.monotonic() - begun:.1f} s, before there was a pose",
                 INTERRUPTED,
@@ -148,10 +148,10 @@ def _format_pose(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
 
 
 def _time(text: str) -> int:
-    """Parse seconds as nanoseconds, exactly.
+    """Parse seconds, and return exact nanoseconds.
 
     Raises:
-        ArgumentTypeError: if it is not a number, or more than a stamp can hold.
+        ArgumentTypeError: if the text is not a number, or too large for a stamp.
     """
     match = re.fullmatch(r"(-?)(\d{1,10})(?:\.(\d{1,9}))?", text)
     if match is None or int(match[2]) >= 1 << 31:
@@ -164,7 +164,7 @@ def _digits(text: str) -> int:
     """Parse a number of decimals.
 
     Raises:
-        ArgumentTypeError: if it is not from 0 to 15.
+        ArgumentTypeError: if the text is not an integer from 0 to 15.
     """
     if not text.isdecimal() or int(text) > _MOST_DIGITS:
         raise ArgumentTypeError(f"{text} is not a number of decimals from 0 to {_MOST_DIGITS}")

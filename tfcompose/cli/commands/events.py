@@ -27,7 +27,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print events until the robot ends.
 
-    Exit code 0, or 1 if none runs, or the connection is lost before it ends.
+    Return 0; 1 if no robot runs, or if the connection is lost before the robot ends.
     """
     from tfcompose.cli.console import Console
     from tfcompose.cli.runs import chosen_run, notices
@@ -44,12 +44,12 @@ def run(arguments: Namespace) -> int:
         address_of=code_addresses(sys.stdout),
     )
     try:
-        for notice, at in notices(runtime_dir, output=sys.stdout):
+        for notice, time_s in notices(runtime_dir, output=sys.stdout):
             ended = isinstance(notice, Ended)
             if arguments.format == "json":
-                print(notice_line(notice, at))
+                print(notice_line(notice, time_s))
             else:
-                lines.at = at
+                lines.time_s = time_s
                 console(notice)
             sys.stdout.flush()
     except BrokenPipeError:
@@ -66,7 +66,7 @@ def run(arguments: Namespace) -> int:
 def _is_held(runtime_dir: RuntimeDir) -> bool:
     """Return whether the robot still runs.
 
-    A robot that ends hangs up a moment before it releases its lock.
+    At its end, a robot closes the connection a moment before it releases its lock.
     """
     for _ in range(40):
         if runtime_dir.holder() is None:
@@ -76,12 +76,12 @@ def _is_held(runtime_dir: RuntimeDir) -> bool:
 
 
 class _TimedLines:
-    """Standard output, with the time before each line."""
+    """Writes lines to standard output, each after its time."""
 
-    at = 0.0
+    time_s = 0.0
 
     def write(self, text: str, *, log: bool = False) -> None:
         """Write a line."""
         del log
-        stamp = time.strftime("%H:%M:%S", time.localtime(self.at))
-        sys.stdout.write(f"{stamp}.{int(self.at * 1000) % 1000:03d} {text}")
+        stamp = time.strftime("%H:%M:%S", time.localtime(self.time_s))
+        sys.stdout.write(f"{stamp}.{int(self.time_s * 1000) % 1000:03d} {text}")

@@ -11,14 +11,15 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_robot_overlay, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from tfcompose.model.robot import Calibration, Edge, Robot
+    from tfcompose.foundation.geometry import Offset
+    from tfcompose.model.robot import Calibration, Edge, Joint, Robot
     from tfcompose.spec.load import Source
 
 
@@ -40,11 +41,10 @@ def arguments(parser: ArgumentParser) -> None:
         help="print all codes, or those of one family, as a Markdown table",
     )
     add_variant(parser)
-    add_robot_overlay(parser)
 
 
 def run(arguments: Namespace) -> int:
-    """Print the page or the chain; exit code 1 if a frame does not exist, 2 for wrong use."""
+    """Print the page or the chain. Return 0, 1 if a frame does not exist, 2 for wrong use."""
     match arguments.what:
         case [] if arguments.table:
             from tfcompose.cli.documentation import code_table
@@ -83,22 +83,48 @@ def _explain_chain(robot: Robot, sources: Sequence[Source], a: str, b: str) -> N
     from tfcompose.cli.compiling import edges_between
 
     rising, falling = edges_between(robot, a, b)
+    adjusted = _adjustments(robot)
     lines = [f"pose of {b} in {a}\n"]
-    lines += [f"  up    {_line(edge, sources)}" for edge in rising]
-    lines += [f"  down  {_line(edge, sources)}" for edge in reversed(falling)]
+    lines += [f"  up    {_line(edge, sources, adjusted)}" for edge in rising]
+    lines += [f"  down  {_line(edge, sources, adjusted)}" for edge in reversed(falling)]
     sys.stdout.write("".join(lines))
 
 
-def _line(edge: Edge, sources: Sequence[Source]) -> str:
+def _line(edge: Edge, sources: Sequence[Source], adjusted: Mapping[str, Offset]) -> str:
     from tfcompose.compiler.provenance import values_of
     from tfcompose.compiler.render.tree import edge_facts
 
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.declared else ""
     measured = f"          {_explain_calibration(edge.calibration)}\n" if edge.calibration else ""
+    if edge.joint and edge.joint.zero_offset:
+        measured = f"          {_explain_offset(edge.joint)}\n"
     values = "".join(f"          {line}\n" for line in values_of(edge, sources))
-    at = f"          {edge.span}{inside}\n" if inside or not values else ""
-    return f"{edge.name}\n          {facts}\n{measured}{at}{values}"
+    place = f"          {edge.span}{inside}\n" if inside or not values else ""
+    if edge.child in adjusted:
+        text = f"adjusted by {adjusted[edge.child].text} on the running robot (tfcompose nudge)"
+        measured += f"          {text}\n"
+    return f"{edge.name}\n          {facts}\n{measured}{place}{values}"
+
+
+def _adjustments(robot: Robot) -> dict[str, Offset]:
+    """Return how far edges are adjusted on the running robot, by child in the robot file."""
+    from tfcompose.cli.runs import adjusted_edges
+
+    frames = {robot.final(edge.child): edge.child for edge in robot.edges}
+    return {
+        frames[edge.child]: edge.adjustment
+        for edge in adjusted_edges(robot.name)
+        if edge.adjustment and edge.child in frames
+    }
+
+
+def _explain_offset(joint: Joint) -> str:
+    """Return the offset of the joint's zero, and the limits that follow from it."""
+    limit, ends = joint.limit, ""
+    if limit and limit.lower is not None and limit.upper is not None:
+        ends = f"; it reports {joint.in_unit(limit.lower)} to {joint.in_unit(limit.upper)}"
+    return f"offset {joint.zero_offset_text} of the zero of the joint {joint.name}{ends}"
 
 
 def _explain_calibration(calibration: Calibration) -> str:

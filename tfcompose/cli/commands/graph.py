@@ -8,7 +8,6 @@ FILE, also draw missing frames.
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,22 +19,15 @@ from tfcompose.cli.options import (
     add_variant,
     settle_duration,
 )
-from tfcompose.cli.terminal import UNREADABLE, fail, printable
-from tfcompose.foundation.geometry import Pose, norm, normalise
+from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Sequence
 
-    from tfcompose.compiler.draw import Arrow, Graph
-    from tfcompose.compiler.draw.arrange import Direction
-    from tfcompose.compiler.draw.graph import Kind
-    from tfcompose.model.plan import Plan
-    from tfcompose.tf.live.edges import EdgeState, TreeObserver
+    from tfcompose.compiler.draw import Graph
 
 FORMATS = (".svg", ".png", ".dot", ".gv", ".mmd")
 FORMAT_NAMES = "svg, png, dot or mmd"
-PNG_PACKAGES = ("resvg_py", "font_lato")
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -97,6 +89,7 @@ def run(arguments: Namespace) -> int:
 
         robot = compile_or_exit(arguments.file or DEFAULT_FILE, arguments)
         graph = graph_of(robot.with_final_names(), poses=arguments.poses)
+    from tfcompose.cli.tree_picture import picture
     from tfcompose.cli.writing import replace_file
 
     if arguments.collapse:
@@ -132,84 +125,17 @@ def _check_output(path: Path) -> None:
 
     if not is_folder(path.parent):
         fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
-    missing = [package for package in PNG_PACKAGES if find_spec(package) is None]
-    if ending == ".png" and missing:
-        advice = "pip install 'tfcompose[pictures]'; svg needs nothing"
-        fail(f"PNG needs the package {missing[0]}: {advice}", UNREADABLE)
-
-
-def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
-    """Return the graph as a file of this format; import only the modules for it."""
-    if ending == ".mmd":
-        from tfcompose.compiler.draw.mermaid import mermaid
-
-        return mermaid(graph, is_down=direction == "down").encode()
-    if ending in {".dot", ".gv"}:
-        from tfcompose.compiler.draw.dot import dot
-
-        return dot(graph, is_down=direction == "down").encode()
-    from tfcompose.compiler.draw.picture import draw
-
-    drawing = draw(graph, direction)
     if ending == ".png":
-        from tfcompose.compiler.draw.png import png
+        from tfcompose.cli.writing import require_png_packages
 
-        return png(drawing)
-    from tfcompose.compiler.draw.svg import svg
-
-    return svg(drawing).encode()
+        require_png_packages()
 
 
 def _published_graph(arguments: Namespace) -> Graph:
     """Return the published tree as a graph."""
     from tfcompose.cli.live import observe_for
+    from tfcompose.cli.tree_picture import graph_of_observers
 
     plan, observers = observe_for("tfcompose_graph", arguments)
     title = arguments.bag or (plan.robot if plan else next(iter(observers))[0])
     return graph_of_observers(list(observers.values()), title, plan, poses=arguments.poses)
-
-
-def graph_of_observers(
-    observers: Sequence[TreeObserver], title: str, plan: Plan | None = None, *, poses: bool = False
-) -> Graph:
-    """Return the observed tree as a graph, with second parents, loops and publishers.
-
-    Planned edges that no node publishes are marked as missing.
-    """
-    from tfcompose.compiler.draw import Arrow, Graph
-
-    edges = [edge for observer in observers for edge in observer.edges(observer.until_ns)]
-    children = {edge.stream.child for edge in edges}
-    missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
-    arrows = [_arrow(edge, poses=poses) for edge in edges]
-    arrows += [
-        Arrow(edge.parent, edge.child, edge.kind, owner=edge.node, detail="missing", pose="")
-        for edge in missing
-    ]
-    return Graph(printable(title), (), tuple(arrows))
-
-
-def _arrow(edge: EdgeState, *, poses: bool) -> Arrow:
-    from tfcompose.compiler.draw import Arrow
-
-    stream = edge.stream
-    rate = "" if stream.static or edge.timing.rate is None else f"{edge.timing.rate:.1f} Hz"
-    owner = printable(edge.publisher) or "unknown"
-    below = _pose(stream.pose) if poses else ""
-    kind: Kind = "static" if stream.static else "dynamic"
-    return Arrow(
-        printable(stream.parent),
-        printable(stream.child),
-        kind,
-        owner=owner,
-        detail=rate,
-        pose=below,
-    )
-
-
-def _pose(pose: Pose) -> str:
-    from tfcompose.compiler.render.tree import short_pose
-
-    length = norm(pose.quat_xyzw)
-    sound = length > 0 and length < float("inf")
-    return short_pose(Pose(pose.xyz, normalise(pose.quat_xyzw))) if sound else "no rotation"

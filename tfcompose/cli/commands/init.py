@@ -34,7 +34,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Write the files; exit code 0, 2 if one of them exists or cannot be written."""
+    """Write the files. Return 0, or 2 if a file exists or cannot be written."""
     if arguments.list:
         width = max(map(len, TEMPLATES))
         print(*(f"{name:<{width}}  {about}" for name, (about, _) in TEMPLATES.items()), sep="\n")
@@ -43,9 +43,11 @@ def run(arguments: Namespace) -> int:
     files = template_files(arguments, arguments.template, output)
     from tfcompose.foundation.reading import exists
 
-    there = [str(path) for path in files if exists(path) or path.is_symlink()]
-    if there:
-        fail(f"nothing was written: {', '.join(there)} exists; -o FILE names another", UNREADABLE)
+    existing = [str(path) for path in files if exists(path) or path.is_symlink()]
+    if existing:
+        fail(
+            f"nothing was written: {', '.join(existing)} exists; -o FILE names another", UNREADABLE
+        )
     _create(files)
     print(f"wrote {', '.join(map(str, files))}")
     file = "" if str(output) == DEFAULT_FILE else f" {output}"
@@ -61,10 +63,10 @@ def run(arguments: Namespace) -> int:
 
 
 def _create(files: Mapping[Path, str]) -> None:
-    """Create all files; none if one cannot be written, or after an interrupt.
+    """Create all files. If a file cannot be written, or after an interrupt, create none.
 
     Raises:
-        SystemExit: after reporting which one cannot be written.
+        SystemExit: after an error message that names the file that cannot be written.
     """
     created: list[Path] = []
     try:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
-from tfcompose.cli.options import DEFAULT_FILE, add_format, add_robot_overlay, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
 from tfcompose.cli.robot_search import YAML_ENDINGS, is_robot, robots_in
 from tfcompose.cli.terminal import (
     CLEAR,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     _Stamp = tuple[int, int] | None
 
 URDF_ENDINGS = (".urdf", ".xacro")
-#: How often --watch checks the files, in seconds.
+#: Interval between the checks of the files by --watch, in seconds.
 CHECK_EVERY_S = 0.3
 
 
@@ -61,8 +61,7 @@ def arguments(parser: ArgumentParser) -> None:
         dest="urdfs",
         help="check FILE as a URDF or xacro file, whatever its suffix; repeatable",
     )
-    add_variant(parser, "check only with this profile")
-    add_robot_overlay(parser, "each robot of the folder in turn")
+    add_variant(parser, "check only with this profile", "each robot of the folder in turn")
     add_format(parser, "json", "sarif", "github", "junit")
     parser.add_argument(
         "--fix", action="store_true", help="apply unambiguous fixes to the named files"
@@ -124,7 +123,7 @@ def codes(text: str) -> list[str]:
     """Parse codes or prefixes of codes, separated by commas.
 
     Raises:
-        ArgumentTypeError: if there is no such code, or none that may be silenced.
+        ArgumentTypeError: if no code matches, or if none of the matching codes may be silenced.
     """
     from tfcompose.foundation.catalogue import CATALOGUE, absent_code
 
@@ -144,7 +143,7 @@ def codes(text: str) -> list[str]:
 
 
 def run(arguments: Namespace) -> int:
-    """Lint the files; exit code 0, 1 with findings that count, 2 if a file cannot be read."""
+    """Lint the files. Return 0, 1 with findings that count, 2 if a file cannot be read."""
     from tfcompose.cli.reading import STDIN, read_text
 
     if (arguments.fix or arguments.diff or arguments.watch) and STDIN in arguments.files:
@@ -163,14 +162,24 @@ def run(arguments: Namespace) -> int:
         return _lint(arguments, environment, read_text)
 
 
-def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[str], str]) -> int:
-    """Lint the files once and return the exit code."""
+def _lint(
+    arguments: Namespace,
+    environment: Mapping[str, str],
+    read: Callable[[str], str],
+    on_folder: Callable[[str], object] = lambda _: None,
+) -> int:
+    """Lint the files once and return the exit code.
+
+    ``on_folder`` is called with each folder of overlays before it is listed.
+    """
     from tfcompose.cli.compiling import library
     from tfcompose.cli.linting import Linter
 
     files = _files(arguments)
     has_one_file = len(files) + len(arguments.urdfs) == 1
-    linter = Linter(arguments, library(), environment, has_one_file=has_one_file)
+    linter = Linter(
+        arguments, library(), environment, has_one_file=has_one_file, on_folder=on_folder
+    )
     urdfs = dict.fromkeys(
         [*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))]
     )
@@ -197,16 +206,19 @@ def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[
 
 
 def _watch(arguments: Namespace, environment: Mapping[str, str]) -> int:
-    """Lint again whenever a file that was read changes, or a folder gets a new one.
+    """Lint again whenever a file that was read changes, or a folder contains a new file.
 
-    Ctrl-C ends it.
+    Ctrl-C ends the loop.
     """
     from tfcompose.cli.reading import forget_lines, read_text
 
     state: dict[str, _Stamp] = {}
 
+    def remember(path: str) -> None:
+        state.setdefault(path, _stamp(path))
+
     def remembering(file: str) -> str:
-        state.setdefault(file, _stamp(file))
+        remember(file)
         return read_text(file)
 
     while True:
@@ -214,7 +226,7 @@ def _watch(arguments: Namespace, environment: Mapping[str, str]) -> int:
             sys.stdout.write(CLEAR)
         state.clear()
         state |= _stamps(arguments)
-        _lint(arguments, environment, remembering)
+        _lint(arguments, environment, remembering, remember)
         sys.stdout.write("watching; Ctrl-C ends it\n")
         sys.stdout.flush()
         while _stamps(arguments) | {file: _stamp(file) for file in state} == state:
@@ -232,16 +244,19 @@ def _stamps(arguments: Namespace) -> dict[str, _Stamp]:
 
 
 def _stamp(file: str) -> _Stamp:
-    """Return the file's modification time and size, or None if it does not exist."""
+    """Return the modification time and size of a file or folder, None if it does not exist.
+
+    A folder's modification time is that of the last file that came or went.
+    """
     try:
-        found = Path(file).stat()
+        status = Path(file).stat()
     except (OSError, ValueError):
         return None
-    return found.st_mtime_ns, found.st_size
+    return status.st_mtime_ns, status.st_size
 
 
 def _files(arguments: Namespace) -> list[str]:
-    """Return the named files, and those in named folders."""
+    """Return the named files, and the files in named folders."""
     names = arguments.files or ([] if arguments.urdfs else [DEFAULT_FILE])
     files = dict.fromkeys(file for name in names for file in robots_in(name))
     if not arguments.skip_foreign:
@@ -250,7 +265,7 @@ def _files(arguments: Namespace) -> list[str]:
 
 
 def _select_findings(findings: list[Finding], arguments: Namespace) -> list[Finding]:
-    """Return the findings that --select and --ignore leave."""
+    """Return the findings that --select and --ignore do not remove."""
     from tfcompose.foundation.catalogue import CATALOGUE
 
     select, ignore = tuple(arguments.select), tuple(arguments.ignore)
@@ -265,21 +280,21 @@ def _select_findings(findings: list[Finding], arguments: Namespace) -> list[Find
 
 
 def _failing(arguments: Namespace) -> frozenset[str]:
-    """Return the severities that make the exit code 1."""
+    """Return the severities for which the exit code is 1."""
     return frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
 
 
 def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
-    """Fix the files, or print the difference, and return the remaining findings of each.
+    """Fix the files, or print the differences, and return each file's remaining findings.
 
-    If a file cannot be written, return only its finding.
+    If a file cannot be written, return only the finding about that.
     """
     from tfcompose.foundation.findings import Span, finding
 
-    found = {file: fixer.fix(file) for file in fixer.files}
+    remaining = {file: fixer.fix(file) for file in fixer.files}
     if arguments.diff:
         sys.stdout.writelines(fixer.diff())
-        return found
+        return remaining
     try:
         fixer.write()
     except OSError as error:
@@ -289,11 +304,11 @@ def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
     for fixed in fixer.fixed:
         now = " … ".join(edit.text.strip(", \n") for edit in fixed.edits)
         stream.write(f"{fixed.span}: fixed[{fixed.code}] {fixed.message}: now {now}\n")
-    return found
+    return remaining
 
 
 def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) -> None:
-    """Print the findings of each file; beside a difference, to stderr."""
+    """Print the findings of each file, on stderr if stdout contains differences."""
     form, findings = arguments.format, [finding for case in cases.values() for finding in case]
     if form == "text":
         from tfcompose.compiler.render.text import summary

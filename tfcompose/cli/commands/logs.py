@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from tfcompose.launcher.runtime_dir import RuntimeDir
 
-#: How often the files are read with -f, in seconds.
+#: Interval between the reads of the files with -f, in seconds.
 READ_EVERY_S = 0.2
 
 
@@ -63,10 +63,10 @@ _UNIT_S = {"s": 1, "m": 60, "min": 60, "h": 3600, "d": 86400}
 
 
 def since(text: str) -> float:
-    """Parse a duration before now, or a local time, as seconds since 1970.
+    """Parse a duration before now, or a local time. Return seconds since 1970.
 
     Raises:
-        ArgumentTypeError: if it is neither.
+        ArgumentTypeError: if the text is neither.
     """
     if ago := _AGO.fullmatch(text):
         return time.time() - float(ago[1]) * _UNIT_S[ago[2]]
@@ -80,17 +80,17 @@ def since(text: str) -> float:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the logs; exit code 0, 1 if there are none."""
+    """Print the logs. Return 0, or 1 if there are no logs."""
     from tfcompose.foundation.findings import did_you_mean
     from tfcompose.launcher.output import Follower, logged_processes, read_logs, runs_of
 
     runtime_dir = _runtime_dir(arguments.robot, shlex.join(["logs", *arguments.name]))
-    known = logged_processes(runtime_dir.logs)
+    processes = logged_processes(runtime_dir.logs)
     for name in arguments.name:
-        if name not in known:
-            advice = did_you_mean(name, known, f"it has logs of {', '.join(known)}")
+        if name not in processes:
+            advice = did_you_mean(name, processes, f"it has logs of {', '.join(processes)}")
             fail(f"{runtime_dir.name} has no log of {name}; {advice}")
-    names = arguments.name or known
+    names = arguments.name or processes
     if arguments.previous and arguments.follow:
         fail("--previous prints a run that has ended: leave out --follow", UNREADABLE)
     *earlier, begin_s = [0.0, *runs_of(runtime_dir.logs)]
@@ -102,7 +102,7 @@ def run(arguments: Namespace) -> int:
     elif arguments.since is not None:
         begin_s = arguments.since
     follower = Follower(runtime_dir.logs, names)
-    printer = _LogPrinter(known, names, times=arguments.times)
+    printer = _LogPrinter(processes, names, times=arguments.times)
     lines = read_logs(runtime_dir.logs, names, begin_s, end_s)
     printer.print(lines if arguments.lines is None else deque(lines, maxlen=arguments.lines))
     while arguments.follow:
@@ -117,22 +117,22 @@ def run(arguments: Namespace) -> int:
 
 
 def _runtime_dir(robot: str | None, command: str) -> RuntimeDir:
-    """Return the robot that runs, or the one that ran last, among those selected.
+    """Return the folder of the selected robot that runs, or else that ran last.
 
-    The name selects them, or else this shell.
+    ``robot`` selects robots by name. None selects the robots of this shell (``in_scope``).
     """
     from tfcompose.cli.runs import chosen_run, in_scope, is_meant
     from tfcompose.foundation.reading import is_folder
     from tfcompose.launcher.output import last_modified
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
-    there = [
+    with_logs = [
         runtime_dir for runtime_dir in runtime_dirs(os.environ) if is_folder(runtime_dir.logs)
     ]
     matching = (
-        [runtime_dir for runtime_dir in there if is_meant(runtime_dir, robot)]
+        [runtime_dir for runtime_dir in with_logs if is_meant(runtime_dir, robot)]
         if robot
-        else in_scope(there)
+        else in_scope(with_logs)
     )
     running = [runtime_dir for runtime_dir in matching if runtime_dir.holder()]
     if matching and len(running) <= 1:
@@ -141,11 +141,11 @@ def _runtime_dir(robot: str | None, command: str) -> RuntimeDir:
             if running
             else max(matching, key=lambda runtime_dir: last_modified(runtime_dir.logs))
         )
-    return chosen_run(robot, command, among=lambda: running or there)
+    return chosen_run(robot, command, among=lambda: running or with_logs)
 
 
 class _LogPrinter:
-    def __init__(self, known: list[str], names: list[str], *, times: bool) -> None:
+    def __init__(self, processes: list[str], names: list[str], *, times: bool) -> None:
         from tfcompose.cli.console import COLOURS, prefix_of
 
         width = max(map(len, names), default=0)
@@ -153,12 +153,12 @@ class _LogPrinter:
         ends = PLAIN if is_coloured(sys.stdout) else ""
         self._prefixes = {
             name: f"{colours[index % len(colours)]}{prefix_of(name, width)}{ends}"
-            for index, name in enumerate(known)
+            for index, name in enumerate(processes)
         }
         self._times = times
 
     def print(self, lines: Iterable[tuple[str, str, str]]) -> None:
-        for at, name, text in lines:
-            stamp = f"{at} " if self._times else ""
+        for time_text, name, text in lines:
+            stamp = f"{time_text} " if self._times else ""
             sys.stdout.write(f"{self._prefixes[name]} {stamp}{text}\n")
         sys.stdout.flush()

@@ -23,7 +23,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the page; exit code 2 if it does not exist."""
+    """Print the page. Return 0, or 2 if the page does not exist."""
     import os
     import pydoc
     import sys
@@ -40,14 +40,14 @@ def run(arguments: Namespace) -> int:
         from tfcompose.foundation.tool import absent
         from tfcompose.spec.language.reference import keys
 
-        known = [*topics(), *commands, *keys()]
+        pages = [*topics(), *commands, *keys()]
         advice = instead_of(arguments.word) or did_you_mean(
-            arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(topics())}"
+            arguments.word.rpartition(".")[2], pages, f"the topics are {', '.join(topics())}"
         )
         missing = absent(arguments.word.partition(".")[0], "command", "topic", "key", "language")
         fail(missing or f"no topic, command or key {arguments.word}; {advice}", UNREADABLE)
     columns = table_width(sys.stdout)
-    os.environ.setdefault("LESS", "FRX")  # let less show bold, and end after a single screen
+    os.environ.setdefault("LESS", "FRX")  # less then shows bold text, and ends after one screen
     if columns is not None:
         text = for_terminal(text, columns, coloured=is_coloured(sys.stdout))
     pydoc.pager(text)

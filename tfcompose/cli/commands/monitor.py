@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tfcompose.model.plan.topics import Topics
     from tfcompose.tf.live.edges import TreeObserver
 
-#: Of the running tree the last 5 to 10 s are shown.
+#: The statistics of a running tree cover the last 5 to 10 s.
 WINDOW_S = 5.0
 
 
@@ -48,9 +48,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Monitor until a signal comes.
+    """Monitor until a signal arrives.
 
-    Exit code 1 without TF, or without a chain from A to B, 2 for a bad bag.
+    Return 0; 1 without TF, or without a chain from A to B; 2 for a bag that cannot be read.
     """
     from tfcompose.cli.live import observe
     from tfcompose.cli.screen import LiveLines
@@ -87,10 +87,11 @@ def run(arguments: Namespace) -> int:
 def _namespace_here() -> str:
     """Return the TF namespace of the robot that runs in this ROS domain.
 
-    Empty for the global topics.
+    The namespace is empty for the global topics.
 
     Raises:
-        SystemExit: after naming the namespaces, if there are several and none is global.
+        SystemExit: if there are several namespaces and none is global, after a message that names
+            them.
     """
     from tfcompose.cli.runs import run_of_domain
     from tfcompose.model.plan.topics import GLOBAL, namespace_options, parts_of
@@ -110,7 +111,7 @@ def _namespace_here() -> str:
 
 
 class _Table(NamedTuple):
-    """The printed edges: of a tree, or between two frames."""
+    """The table of edges: all edges of a tree, or the edges between two frames."""
 
     observer: TreeObserver
     topics: Topics
@@ -124,16 +125,16 @@ class _Table(NamedTuple):
         from tfcompose.tf.live.chain import chain_between
 
         now_ns = self.observer.until_ns
-        # What moves comes first.
+        # Moving edges come first.
         edges = sorted(self.observer.edges(now_ns), key=lambda state: state.stream.static)
         chain = chain_between(edges, *self.frames) if self.frames else None
-        shown = edges if chain is None else () if isinstance(chain, str) else chain.all_edges
+        printed = edges if chain is None else () if isinstance(chain, str) else chain.all_edges
         if self.as_json:
-            sys.stdout.write(objects_of(shown, self.observer, now_ns, chain))
+            sys.stdout.write(objects_of(printed, self.observer, now_ns, chain))
             sys.stdout.flush()
             return int(isinstance(chain, str))
         width = table_width(sys.stdout)
-        lines = lines_of(shown, self.observer, now_ns, width, coloured=is_coloured(sys.stdout))
+        lines = lines_of(printed, self.observer, now_ns, width, coloured=is_coloured(sys.stdout))
         if chain is not None:
             lines[0] = chain_line(chain, *self.frames)
         if not self.observer.received_any:

@@ -10,7 +10,7 @@ import sys
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_file, add_format, add_frames, add_robot_overlay, add_variant
+from tfcompose.cli.options import add_file, add_format, add_frames, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail
 from tfcompose.foundation.geometry import Pose
 
@@ -25,12 +25,11 @@ def arguments(parser: ArgumentParser) -> None:
     add_file(parser)
     add_frames(parser)
     add_variant(parser)
-    add_robot_overlay(parser)
     add_format(parser)
 
 
 def run(arguments: Namespace) -> int:
-    """Print the pose; exit code 1 if a frame does not exist, or only its driver knows the pose."""
+    """Print the pose. Return 1 if a frame does not exist, or if only a driver knows the pose."""
     from tfcompose.cli.compiling import compile_or_exit, edges_between
     from tfcompose.compiler.render.pose import pose_json, pose_text
     from tfcompose.foundation.numbers import clean
@@ -57,21 +56,24 @@ def run(arguments: Namespace) -> int:
 
 
 def _pose_in_top(chain: list[Edge]) -> Pose:
-    """Return the pose of the chain's first frame in its last parent, nominal if it moves."""
+    """Return the pose of the chain's first frame in its last parent.
+
+    Moving edges have their nominal pose.
+    """
     return reduce(lambda pose, edge: edge.pose @ pose, chain, Pose())
 
 
 def _moving(edges: list[Edge]) -> str:
-    """Return the line about moving edges in the chain, and the poses assumed for them.
+    """Return a line that names the moving edges in the chain and their assumed poses.
 
-    Empty if none moves.
+    Return an empty text if no edge moves.
     """
     joints = [edge.joint_name for edge in edges if edge.kind == "joint"]
-    others = [edge.name for edge in edges if edge.kind == "dynamic"]
+    dynamic = [edge.name for edge in edges if edge.kind == "dynamic"]
     parts = [f"{'joints' if joints[1:] else 'joint'} {', '.join(joints)} at 0"] if joints else []
     parts += (
-        [f"{', '.join(others)} at {'their nominal poses' if others[1:] else 'its nominal pose'}"]
-        if others
+        [f"{', '.join(dynamic)} at {'their nominal poses' if dynamic[1:] else 'its nominal pose'}"]
+        if dynamic
         else []
     )
     return f"  with       {' and '.join(parts)}\n" if parts else ""

@@ -45,20 +45,20 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the list or the page; exit code 1 if the preset does not exist or is invalid."""
+    """Print the list or the page. Return 1 if the preset does not exist or is invalid."""
     from tfcompose.cli import preset_page
     from tfcompose.cli.compiling import library
     from tfcompose.compiler.resolve.presets import node_preset_names
     from tfcompose.foundation.findings import RejectedError
 
-    known = library().over(arguments.preset_path)
+    presets = library().over(arguments.preset_path)
     name = arguments.name
     try:
-        if name and known.file(name) and "/_" not in name:
-            return _show(preset_page.facts(name, known), arguments.format)
+        if name and presets.file(name) and "/_" not in name:
+            return _show(preset_page.facts(name, presets), arguments.format)
         if name in node_preset_names():
             return _show(preset_page.node_facts(name), arguments.format)
-        return _list(name, known, arguments.format)
+        return _list(name, presets, arguments.format)
     except RejectedError as error:
         print_findings(error.findings, sys.stderr)
         return 1
@@ -76,12 +76,12 @@ def _show(facts: dict[str, Any], form: str) -> int:
     return 0
 
 
-def _list(only: str | None, known: Library, form: str) -> int:
+def _list(only: str | None, all_presets: Library, form: str) -> int:
     from tfcompose.cli import preset_page
     from tfcompose.cli.tables import shorten
     from tfcompose.foundation.findings import did_you_mean
 
-    presets = {name: known.get(name) for name in known.names}
+    presets = {name: all_presets.get(name) for name in all_presets.names}
     rows: list[dict[str, str]] = [
         {
             "name": name,
@@ -90,13 +90,13 @@ def _list(only: str | None, known: Library, form: str) -> int:
             "kind": preset.kind,
             "about": preset.about,
         }
-        | _likeness(preset, known)
+        | _likeness(preset, all_presets)
         for name, preset in presets.items()
     ]
     rows += preset_page.node_rows()
     kinds = sorted({kind for row in rows for kind in _words(row)})
-    wanted = {only, *_KINDS.get(only or "", ())}
-    exact = [row for row in rows if not only or not wanted.isdisjoint(_words(row))]
+    chosen = {only, *_KINDS.get(only or "", ())}
+    exact = [row for row in rows if not only or not chosen.isdisjoint(_words(row))]
     partly = [row for row in rows if only and any(only.lower() in kind for kind in _words(row))]
     rows = (
         exact or partly or [row for row in rows if only and only.lower() in row["about"].lower()]
@@ -124,15 +124,15 @@ def _list(only: str | None, known: Library, form: str) -> int:
     return 0
 
 
-def _likeness(preset: PresetSpec, known: Library) -> dict[str, str]:
-    """Return the model with exactly the same frames, or the one that it is derived from."""
+def _likeness(preset: PresetSpec, presets: Library) -> dict[str, str]:
+    """Return the model with the same frames, or the model on which the preset is based."""
     if not preset.extends or "/_" in preset.extends:
         return {}
-    other = known.get(preset.extends)
+    base = presets.get(preset.extends)
     same = (preset.mount, preset.frames, preset.options) == (
-        other.mount,
-        other.frames,
-        other.options,
+        base.mount,
+        base.frames,
+        base.options,
     )
     return {"same_as" if same else "made_from": preset.extends}
 
@@ -148,7 +148,7 @@ def _about(row: dict[str, str]) -> str:
     return f"{row['model']}: {row['about']}{like}"
 
 
-#: What kinds of sensors are called together.
+#: Names for several kinds of sensors together.
 _KINDS = {
     "camera": ("rgbd", "stereo"),
     "lidar": ("lidar2d", "lidar3d"),

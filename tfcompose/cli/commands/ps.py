@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tfcompose.model.messages import RobotStatus
 
 
-#: Of which severity findings make the exit code 1, by the levels of --fail-on.
+#: For each level of --fail-on, the severities for which the exit code is 1.
 _LEVELS: dict[str, frozenset[str]] = {
     "absent": frozenset(),
     "warning": frozenset({"error", "warning"}),
@@ -44,8 +44,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the table; exit code 0, 1 if a robot does not answer, or as --fail-on requires."""
+    """Print the table. Return 0; 1 if a robot does not answer, or as --fail-on requires."""
     from tfcompose.cli.process_table import HEAD, TABLE, row, state_of, uptime
+    from tfcompose.foundation.geometry import Offset
     from tfcompose.launcher.usage import usage_of
 
     robots, code = _robots(arguments.robot)
@@ -65,9 +66,14 @@ def run(arguments: Namespace) -> int:
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
         state += f", {_count_by_severity(status.findings)}" if status.findings else ""
-        print(f"{name}: {state}, launcher {status.launcher}, up {uptime(status.uptime)}")
+        state += f", launcher {status.launcher}, up {uptime(status.uptime)}"
+        state += f", with {', '.join(status.overlays)}" if status.overlays else ""
+        print(f"{name}: {state}")
         for finding in status.findings:
             print(f"  {finding.severity}[{finding.code}] {finding.message}")
+        for adjustment in status.adjusted:
+            offset = Offset(adjustment.xyz_m, adjustment.rot_rad)
+            print(f"  {adjustment.edge} is adjusted by {offset.text} (tfcompose nudge)")
         rows = [HEAD, *(row(process, used) for process in status.processes)]
         print(
             *TABLE.lines(
@@ -100,7 +106,10 @@ def _exit_code(fail_on: str | None, robots: Mapping[str, RobotStatus]) -> int:
 
 
 def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
-    """Return the robots that answer, by name, and the exit code: 1 after reporting others."""
+    """Return the robots that answer, by name, and the exit code.
+
+    The code is 1 if a robot does not answer. The function reports such robots.
+    """
     from tfcompose.cli.runs import is_meant, request, running
     from tfcompose.launcher.runtime_dir import RuntimeDirError
     from tfcompose.model.messages import RobotStatus, StatusRequest
@@ -117,8 +126,8 @@ def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
         runtime_dir.name: request(runtime_dir, StatusRequest(), RobotStatus)
         for runtime_dir in places
     }
-    found = {name: status for name, status in answers.items() if status is not None}
-    return found, 0 if len(found) == len(answers) else FAILED
+    answering = {name: status for name, status in answers.items() if status is not None}
+    return answering, 0 if len(answering) == len(answers) else FAILED
 
 
 def _as_json(name: str, status: RobotStatus, used: Usage) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The commands that steer processes of a running robot: ``start``, ``stop`` and ``restart``."""
+"""The commands ``start``, ``stop`` and ``restart`` for processes of a running robot."""
 
 from __future__ import annotations
 

@@ -18,7 +18,6 @@ from tfcompose.cli.options import (
     add_for,
     add_format,
     add_namespace,
-    add_robot_overlay,
     add_variant,
     settle_duration,
 )
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 
     Topics = tuple[str, str]
 
-#: The column of what there is to say about a published frame.
+#: The column with remarks about a published frame.
 REMARK = 5
 
 
@@ -45,7 +44,6 @@ def arguments(parser: ArgumentParser) -> None:
         "file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag"
     )
     add_variant(parser)
-    add_robot_overlay(parser)
     parser.add_argument("--live", action="store_true", help="print the tree that is published now")
     add_bag(parser, "print the tree of a recording")
     add_for(parser, "with --live: observe for S seconds; default: 3")
@@ -54,9 +52,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the tree; exit code as for build.
+    """Print the tree. Return the exit code of ``build``.
 
-    For a published tree, 1 if there is none, 2 if a bag cannot be read.
+    For a published tree, return 1 if there is no tree, 2 if a bag cannot be read.
     """
     settle_duration(arguments, 3.0, is_live=arguments.live)
     if arguments.live or arguments.bag:
@@ -77,9 +75,9 @@ def run(arguments: Namespace) -> int:
 
 
 def _fit_to_terminal(text: str) -> str:
-    """Return the text with each line cut to the width of the terminal.
+    """Return the text with each line shortened to the width of the terminal.
 
-    For a file or a pipe it is unchanged.
+    For a file or a pipe, return the text unchanged.
     """
     from tfcompose.cli.tables import shorten
 
@@ -90,9 +88,9 @@ def _fit_to_terminal(text: str) -> str:
 
 
 def _planned_json(robot: Robot) -> str:
-    """Return one line of JSON, in the shape of --live.
+    """Return a line of JSON in the format of --live.
 
-    It has the trees with their roots, and the robot file's data about edges.
+    The line contains the trees with their roots, and the robot file's data about edges.
     """
     from tfcompose.compiler.emit.plan import plan_of
     from tfcompose.tf.live.edges import forest
@@ -176,7 +174,7 @@ def _draw_trees(trees: list[Tree], *, plan: Plan | None) -> str:
 def _wrap_rows(
     branches: Sequence[Branch], rows: Sequence[tuple[str, ...]], columns: int
 ) -> Iterator[str]:
-    """Yield the rows without columns; long ones continue on the next line."""
+    """Yield the rows as lines without columns. A long row continues on the next line."""
     from tfcompose.cli.tables import shorten
     from tfcompose.compiler.render.tree import wrap_rows
 
@@ -189,10 +187,10 @@ def _wrap_rows(
         for branch, row in zip(branches, rows, strict=True)
     ]
     for row, lines in zip(rows, wrap_rows(drawing, columns), strict=True):
-        shown = [shorten(line, columns, at_end=True) for line in lines]
+        shortened = [shorten(line, columns, at_end=True) for line in lines]
         if is_coloured(sys.stdout) and (colour := _colour(REMARK, row[REMARK])):
-            shown[-1] = shown[-1].replace(row[REMARK], f"{colour}{row[REMARK]}{PLAIN}")
-        yield "\n".join(shown)
+            shortened[-1] = shortened[-1].replace(row[REMARK], f"{colour}{row[REMARK]}{PLAIN}")
+        yield "\n".join(shortened)
 
 
 def _colour(column: int, text: str) -> str:
@@ -212,9 +210,9 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
             return (name, "", "", "", "", "")
         return (name, planned.kind, "", "", "", f"missing: owner {planned.owner} ({planned.node})")
     observed = branch.observed[0]
-    others = [
-        f"also {printable(other.name)} from {printable(other.publisher) or 'unknown'}"
-        for other in branch.observed[1:]
+    rivals = [
+        f"also {printable(rival.name)} from {printable(rival.publisher) or 'unknown'}"
+        for rival in branch.observed[1:]
     ]
     remarks = [_status(branch, plan)] if plan else []
     rate = (
@@ -232,12 +230,12 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
         printable(_owner(branch, plan)) or "–",
         rate,
         age,
-        "; ".join([*remarks, *others]),
+        "; ".join([*remarks, *rivals]),
     )
 
 
 def _owner(branch: Branch, plan: Plan | None) -> str:
-    """Return the publisher of the frame: the owner with its node, or another node."""
+    """Return the frame's publisher: the owner with its node, or another node."""
     from tfcompose.guard.verdict.ownership import may_be_owners, relays_of
 
     planned, observed = branch.planned, branch.observed[0]

@@ -26,6 +26,6 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Start the plan and return the exit code.
 
-    0 after a clean end, 1 after a failure or a finding, 2 unreadable.
+    The code is 0 after a clean end, 1 after a failure or a finding, 2 if something cannot be read.
     """
     return build_and_start(arguments)

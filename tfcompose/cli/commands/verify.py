@@ -18,9 +18,9 @@ from tfcompose.cli.options import (
     add_bag,
     add_for,
     add_format,
-    add_robot_overlay,
     add_tolerance,
     add_variant,
+    changes_robot,
     settle_duration,
 )
 from tfcompose.cli.terminal import fail, print_findings, warn
@@ -43,7 +43,6 @@ def arguments(parser: ArgumentParser) -> None:
         help="default: the robot that runs in this ROS domain, or robot.yaml",
     )
     add_variant(parser)
-    add_robot_overlay(parser)
     parser.add_argument(
         "--running",
         action="store_true",
@@ -65,7 +64,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
+    """Verify. Return 0 if everything is as expected, 1 if not, 2 if something cannot be read."""
     from tfcompose.cli.live import observe_topics, recording_day, refuse_live_bag
     from tfcompose.cli.plans import expected_plan
     from tfcompose.guard.verdict.verify import verify
@@ -76,7 +75,8 @@ def run(arguments: Namespace) -> int:
     plan, places = _running_plan(arguments) or expected_plan(
         arguments.file or DEFAULT_FILE, arguments, recording_day(arguments.bag)
     )
-    other = other_plan(arguments, plan)
+    running = other_plan(arguments, plan)
+    _warn_of_adjustments(arguments, plan)
     # Programs get each missing edge; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()
@@ -91,25 +91,19 @@ def run(arguments: Namespace) -> int:
     )
     seconds = time.monotonic() - begun
     verdicts = verify(plan, observers, arguments.tolerance, places)
-    if other:
-        verdicts = [of_other_plan(verdict, other) for verdict in verdicts]
+    if running:
+        verdicts = [of_other_plan(verdict, running) for verdict in verdicts]
     return _report(arguments, plan, verdicts, seconds)
 
 
 def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
-    """Return the plan of the robot that runs in this ROS domain, without places.
+    """Return the plan of the robot that runs in this ROS domain, with an empty map of places.
 
-    None if a file or a bag is given.
+    Return None if the command line names a file, a bag or options that change the robot file.
     """
     from tfcompose.cli.runs import plan_of_domain
 
-    changed = (
-        arguments.profiles
-        or arguments.overlay_robot
-        or arguments.overlays
-        or arguments.settings
-        or arguments.arg_values
-    )
+    changed = changes_robot(arguments)
     if arguments.running and (arguments.file or arguments.bag or changed):
         fail("--running takes the plan of the robot that runs: no FILE, --bag or --profile")
     if arguments.file or arguments.bag or changed:
@@ -120,32 +114,54 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
     return (plan, {}) if plan else None
 
 
-def other_plan(arguments: Namespace, plan: Plan) -> Plan | None:
-    """Return the plan by which the robot runs here, after printing a note, if it is a variant.
+def _warn_of_adjustments(arguments: Namespace, plan: Plan) -> None:
+    """Print the edges whose poses nudge changed on the running robot."""
+    from tfcompose.cli.runs import adjusted_edges
 
-    A variant has other processes or owners, as with another profile. Other poses do not count:
-    verify is to find those.
+    for edge in () if arguments.bag else adjusted_edges(plan.robot):
+        if edge.adjustment:
+            warn(
+                f"{edge.name} is adjusted by {edge.adjustment.text} on the running robot;"
+                f" tfcompose nudge {edge.mounts or edge.child} --reset restores the built pose"
+            )
+
+
+def other_plan(arguments: Namespace, plan: Plan) -> Plan | None:
+    """Return the plan of the robot that runs here if it is a variant of ``plan``.
+
+    A variant has other overlays, processes or owners, for example from another profile. The
+    function prints a note about the variant. Other poses do not make a variant, because verify
+    must find them.
     """
     from tfcompose.cli.runs import run_of_domain
 
     running = None if arguments.bag else run_of_domain()
-    if running is None or running[1].robot != plan.robot or _shape(running[1]) == _shape(plan):
+    if running is None or running[1].robot != plan.robot:
+        return None
+    if running[1].overlays != plan.overlays:
+        overlays, of_plan = (
+            ", ".join(each.overlays) or "no overlay" for each in (running[1], plan)
+        )
+        difference = f"{overlays}, and this plan has {of_plan}"
+    elif _shape(running[1]) != _shape(plan):
+        difference = "other processes or owners than this plan has, as by another --profile"
+    else:
         return None
     warn(
-        f"{running[0].name} runs with other processes or owners than this plan has, as by another"
-        " --profile; tfcompose verify --running compares with the plan that runs"
+        f"{running[0].name} runs with {difference};"
+        " tfcompose verify --running compares with the plan that runs"
     )
     return running[1]
 
 
 def _shape(plan: Plan) -> tuple[Mapping[str, str], Mapping[str, str]]:
-    """Return the kinds of a plan's processes, and the owners of its edges."""
+    """Return the kind of each process of the plan, and the owner of each edge."""
     kinds = {process.name: process.kind for process in plan.processes}
     return kinds, {edge.child: edge.owner for edge in plan.edges}
 
 
 def of_other_plan(verdict: Verdict, running: Plan) -> Verdict:
-    """Return a verdict without advice about processes of the running plan."""
+    """Return the verdict without advice about processes of the running plan."""
     from dataclasses import replace
 
     advice = "tfcompose verify --running compares with the plan that runs"

@@ -28,9 +28,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Wait; exit code of the robot, or 0 when it is ready.
+    """Wait. Return the exit code of the robot, or 0 when the robot is ready.
 
-    1 if the time is over or no robot runs.
+    Return 1 after the timeout, or if no robot runs.
     """
     from tfcompose.cli.runs import chosen_run, notices, wait_until_ready
     from tfcompose.model.messages import Ended

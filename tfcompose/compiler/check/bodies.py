@@ -1,4 +1,4 @@
-"""Rules about bodies: inertia, materials, and which description holds them."""
+"""Rules about bodies: inertia, materials, and bodies that no URDF contains."""
 
 from __future__ import annotations
 
@@ -27,12 +27,18 @@ def inertia_missing(robot: Robot) -> Iterator[Finding]:
         edge for edge in robot.edges if (edge.joint or edge.free) and edge.child in robot.links
     ]
     masses = {name for name, link in robot.links.items() if link.inertial or link.has_mass}
-    own = masses - {frame for sensor in robot.sensors for frame in (sensor.mount, *sensor.frames)}
-    other = next((edge.child for edge in moving if _has_one(own, fixed, edge.child)), None)
-    for edge in moving if other else ():
+    frames = masses - {
+        frame for sensor in robot.sensors for frame in (sensor.mount, *sensor.frames)
+    }
+    link_with_mass = next(
+        (edge.child for edge in moving if _has_one(frames, fixed, edge.child)), None
+    )
+    for edge in moving if link_with_mass else ():
         if not _has_one(masses, fixed, edge.child):
             span = robot.links[edge.child].span
-            message = f"{edge.child}, moved by {edge.joint_name}, has no mass; {other} has one"
+            message = (
+                f"{edge.child}, moved by {edge.joint_name}, has no mass; {link_with_mass} has one"
+            )
             advice = '<inertial> with <mass value="…"/> and <inertia …/>'
             if not robot.is_foreign(span):
                 link = robot.links[edge.child]
@@ -44,7 +50,7 @@ def inertia_missing(robot: Robot) -> Iterator[Finding]:
 
 
 def _has_one(names: set[str], fixed: dict[str, list[str]], link: str) -> bool:
-    """Whether the link, or anything that is fixed to it, is one of these."""
+    """Return whether ``names`` contains the link or a link fixed to it."""
     waiting, passed = [link], set[str]()
     while waiting:
         name = waiting.pop()
@@ -76,7 +82,7 @@ def impossible_inertia(robot: Robot) -> Iterator[Finding]:
 
 
 def _impossible(tensor: tuple[float, float, float, float, float, float]) -> str:
-    """Return why no body has the inertia; empty if one may."""
+    """Return why no rigid body can have this inertia; empty if a body can."""
     low, middle, high = _principal(tensor)
     if low <= 0:
         return f"smallest principal moment is {low:.3g} kg m²"
@@ -94,7 +100,7 @@ def _principal(
     """
     scale = (
         max(map(abs, tensor)) or 1.0
-    )  # squares of what a foreign file holds may leave the range of floats
+    )  # scaled, because squares of values from a URDF may overflow a float
     xx, xy, xz, yy, yz, zz = (value / scale for value in tensor)
     mean = (xx + yy + zz) / 3
     spread = math.sqrt(
@@ -119,9 +125,10 @@ def _principal(
     return (low * scale, (3 * mean - high - low) * scale, high * scale)
 
 
-#: A mesh that is no longer marks a frame, and is not its body.
+#: A mesh at most this long only marks a frame. It does not show the frame's body.
 _MARK_M = 1e-3
-#: Allowed ratio to the inertia of its shapes, and to that of boxes around its meshes.
+#: Largest allowed ratio between an inertia and the inertia computed from the link's shapes, or
+#: from boxes around the link's meshes.
 _TIMES, _TIMES_OF_BOX = 10, 100
 
 
@@ -148,18 +155,22 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
 
 
 def _of_boxes(mass: float, link: Link) -> tuple[float, ...]:
-    """Return the traces of inertias of the boxes around the link's shapes, each with the mass."""
+    """Return the traces of the inertias of the boxes around the link's shapes.
+
+    Each box has the full ``mass`` in kg.
+    """
     sizes = map(size_of, (*link.visuals, *link.collisions))
     return tuple(
         mass / 6 * math.hypot(*size) ** 2 for size in sizes if size and max(size) > _MARK_M
     )
 
 
-#: Osmium has 22,600 kg/m³.
+#: In kg/m³. The densest element, osmium, has 22,600 kg/m³.
 _DENSEST = 25_000.0
-#: With its mass read in grams, such a body is as dense as a hollow one is.
+#: Density in kg/m³ from which the mass is probably in grams. A hollow body whose mass in grams was
+#: read as kilograms has at least this density.
 _DENSE_IN_GRAMS = 100_000.0
-#: A smaller body is a mark on a frame, with a mass because a simulator asks for one.
+#: A smaller body only marks a frame. It has a mass because simulators require a mass.
 _LEAST_BODY_M3 = 1e-5
 
 
@@ -191,15 +202,15 @@ def density_of_no_material(robot: Robot) -> Iterator[Finding]:
 
 #: Density of air at sea level, in kg/m³.
 _AIR = 1.2
-#: A smaller body has a mass only because a simulator asks for one; of a larger one the sizes are
-#: not in metres (TF414).
+#: Range of volumes to check. A smaller body has a mass only because simulators require a mass. The
+#: sizes of a larger body are not in metres (TF414).
 _LEAST_LIGHT_M3, _MOST_LIGHT_M3 = 1e-3, 1e3
 
 
 def _lighter_than_air(link: Link) -> Inertial | None:
-    """Return the inertial of a link that is lighter than air of its shapes' volume.
+    """Return the link's inertial if the link is lighter than air of the same volume.
 
-    Boxes around meshes say nothing: most of a frame's is empty.
+    Only primitive shapes count. A box around a mesh of an open frame is mostly empty.
     """
     lists = [shapes for shapes in (link.visuals, link.collisions) if shapes]
     if link.inertial is None or any(shape.mesh for shapes in lists for shape in shapes):
@@ -211,7 +222,7 @@ def _lighter_than_air(link: Link) -> Inertial | None:
 
 
 def _density(link: Link) -> float:
-    """Return a link's mass over the volume of its shapes in kg/m³; 0 where that says nothing."""
+    """Return the link's mass divided by the volume of its shapes, in kg/m³; 0 if unknown."""
     volume = max(_most_volume(link.visuals), _most_volume(link.collisions))
     if link.inertial is None or not _LEAST_BODY_M3 < volume < math.inf:
         return 0.0
@@ -219,9 +230,9 @@ def _density(link: Link) -> float:
 
 
 def _most_volume(shapes: tuple[Shape, ...]) -> float:
-    """Return the volume of the shapes in m³, of a mesh that of its box.
+    """Return the total volume of the shapes in m³.
 
-    Infinite where that is not known.
+    A mesh counts with the volume of its bounding box. If a box is unknown, the volume is infinite.
     """
     volume = 0.0
     for shape in shapes:
@@ -253,7 +264,7 @@ def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
     for process in robot.processes:
         if (
             process.package in _KDL_READERS and not process.describes
-        ):  # what tfcompose starts gets a root without one
+        ):  # tfcompose's own publishers get a root link without inertia
             message = f"root link {root.name} has an inertia, which {process.package} ignores"
             notes = [Note(f"{process.name} is defined here", process.span)]
             advice = f"give {root.name} a parent without a body, such as base_footprint"
@@ -264,7 +275,7 @@ def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
 @rule("TF713", of_urdf=True)
 def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
     first: dict[str, Material] = {}
-    others: dict[tuple[str, object], dict[str, Material]] = {}
+    variants: dict[tuple[str, object], dict[str, Material]] = {}
     for link in robot.links.values():
         for shape in link.visuals:
             material = shape.material
@@ -272,8 +283,10 @@ def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
                 continue
             appearance = _appearance(material)
             if _appearance(first.setdefault(material.name, material)) != appearance:
-                others.setdefault((material.name, appearance), {}).setdefault(link.name, material)
-    for (name, _), links in others.items():
+                variants.setdefault((material.name, appearance), {}).setdefault(
+                    link.name, material
+                )
+    for (name, _), links in variants.items():
         link_name, material = next(iter(links.items()))
         them = with_more(link_name, len(links) - 1, "link")
         message = f"material {name} has another colour in {them} than in its definition"
@@ -292,10 +305,10 @@ def _appearance(material: Material) -> tuple[object, ...]:
 def material_without_colour(robot: Robot) -> Iterator[Finding]:
     shapes = [shape for link in robot.links.values() for shape in link.visuals]
     used = [shape.material for shape in shapes if shape.material]
-    known = [material.name for material in used if material.rgba or material.texture]
+    names = [material.name for material in used if material.rgba or material.texture]
     for material in dict.fromkeys(used):
-        if not (material.rgba or material.texture) and material.name not in known:
-            advice = did_you_mean(material.name, known, "add rgba: [0.5, 0.5, 0.5, 1]")
+        if not (material.rgba or material.texture) and material.name not in names:
+            advice = did_you_mean(material.name, names, "add rgba: [0.5, 0.5, 0.5, 1]")
             yield finding(
                 "TF714", f"material {material.name} has no colour", material.span, help=advice
             )
@@ -320,12 +333,12 @@ def body_in_no_urdf(robot: Robot) -> Iterator[Finding]:
         (robot.below(root) for root in robot.roots() if robot.base in robot.below(root)),
         set[str](),
     )
-    first, *others = [name for name in outside if name in tree] or [
+    first, *further = [name for name in outside if name in tree] or [
         ""
-    ]  # TF204 is about other trees
+    ]  # TF204 reports other trees
     if first:
-        more = f" (nor {'are' if others[1:] else 'is'} {len(others)} more)" if others else ""
-        notes = [Note(f"{name} is not either", outside[name]) for name in others[:_MOST_LISTED]]
+        more = f" (nor {'are' if further[1:] else 'is'} {len(further)} more)" if further else ""
+        notes = [Note(f"{name} is not either", outside[name]) for name in further[:_MOST_LISTED]]
         message = (
             f"no URDF has the body of {first}: {first} is not below the base {robot.base}{more}"
         )

@@ -1,9 +1,10 @@
-"""Run every rule over a robot, silence findings, and add notes about replaced values.
+"""Run all rules over a robot, silence findings, and add notes about replaced values.
 
-If a rule crashes, that is a finding, and the other rules still run. ``# tfcompose: allow TF301
-because …`` silences a finding on its line or, alone on a line, on the next one. ``rules`` sets a
-severity, or ``off``, for a whole robot. Findings about text and keys cannot be silenced, because
-the file was not understood; nor can findings that leave nothing to build.
+If a rule crashes, ``check`` reports a finding and runs the other rules. The comment ``# tfcompose:
+allow TF301 because …`` silences a finding on the comment's line. A comment on a line of its own
+silences findings on the next line. The section ``rules`` sets a severity, or ``off``, for the
+entire robot. Some findings cannot be silenced: findings about text and keys, because the file was
+not understood, and findings that leave nothing to build.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     Used = set[tuple[Allow, str]]
 
 
-#: Findings about one value, at its place.
+#: Codes of findings about a single value. The finding's span is the span of that value.
 _OF_VALUES = frozenset({"TF410", "TF411", "TF412", "TF704", "TF705", "TF707"})
 
 
@@ -55,7 +56,7 @@ def by_code(rules: Iterable[Rule]) -> dict[str, Rule]:
     """Return the rules by code, sorted by code.
 
     Raises:
-        ValueError: if two have one code.
+        ValueError: if two rules have the same code.
     """
     table: dict[str, Rule] = {}
     for rule in sorted(rules, key=lambda rule: rule.code):
@@ -87,9 +88,9 @@ RULES = by_code(
 def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]:
     """Return the findings of all rules, in no particular order.
 
-    Omitted are findings that only follow from a refused value, unused entries of a variant
-    (profiles or overlays merged), and warnings about parts from a URDF, which ``lint`` of their
-    files reports.
+    Three kinds of findings are left out: findings that only follow from a rejected value; unused
+    entries of a variant, a robot with profiles or overlays merged; and warnings about parts from a
+    URDF, because ``lint`` reports them when it reads that URDF.
     """
     findings: list[Finding] = []
     for rule in rules:
@@ -116,9 +117,9 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
 
 
 def _at_shared_values(findings: list[Finding]) -> list[Finding]:
-    """Return one finding for a value that several entries share through a YAML anchor.
+    """Merge findings about a value that several entries share through a YAML anchor.
 
-    Its notes have the others.
+    The notes of the merged finding name the other entries.
     """
     by_place: dict[tuple[str, Span], list[Finding]] = {}
     single = []
@@ -128,14 +129,14 @@ def _at_shared_values(findings: list[Finding]) -> list[Finding]:
         else:
             single.append(entry)
     shared = [
-        replace(first, notes=(*first.notes, *(Note(other.message) for other in others)))
-        for first, *others in by_place.values()
+        replace(first, notes=(*first.notes, *(Note(repeat.message) for repeat in repeats)))
+        for first, *repeats in by_place.values()
     ]
     return [*single, *shared]
 
 
 def rules_of_tools(robot: Robot) -> tuple[list[Rule], list[Finding]]:
-    """Return the rules of tools whose sections the file has, and load failures."""
+    """Return rules of tools whose sections the file has, and findings for load failures."""
     rules: list[Rule] = []
     findings = []
     for key in keys_in(robot.sections):
@@ -165,7 +166,7 @@ def _is_left_out(finding: Finding, rule: Rule, robot: Robot) -> bool:
 
 
 def _of_part(finding: Finding, robot: Robot) -> Finding:
-    """Return the finding, with a note for each part whose file it is about."""
+    """Return the finding with a note for each part that uses the finding's file."""
     notes = robot.part_notes.get(finding.span.file, ()) if finding.span else ()
     return replace(finding, notes=(*finding.notes, *notes)) if notes else finding
 
@@ -173,11 +174,11 @@ def _of_part(finding: Finding, robot: Robot) -> Finding:
 def silence(
     findings: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
 ) -> tuple[list[Finding], Used]:
-    """Return the findings that are not silenced, and the comments that silenced one.
+    """Return the findings that nothing silences, and the comments that silenced a finding.
 
-    A comment or an entry of ``rules`` silences a finding. ``rules`` maps codes and names to a
-    severity or ``off``, each with its place. An entry that is neither a code nor a name, or cannot
-    be set, is a finding too.
+    A comment or an entry of ``rules`` silences a finding. ``rules`` maps a code or a name to a
+    severity or ``off`` and to the span of the entry. An entry with an unknown code or name, or for
+    a code whose severity is fixed, becomes a finding.
     """
     unknown = _unknown_rules({name: span for name, (_, span) in rules.items()})
     return apply(
@@ -190,7 +191,7 @@ def silence(
 
 
 def apply(findings: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], Used]:
-    """Return the findings that are not allowed, and the used comments with codes."""
+    """Return the findings that no comment allows, and each effective comment with its code."""
     kept: list[Finding] = []
     used: Used = set()
     for entry in findings:
@@ -205,7 +206,7 @@ def apply(findings: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Fi
 def _with_severities(findings: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
     """Return the findings with the severities that the robot's ``rules`` set.
 
-    Those that are ``off`` are left out.
+    Findings whose severity is ``off`` are left out.
     """
     levels = {
         code: level
@@ -217,7 +218,7 @@ def _with_severities(findings: Iterable[Finding], rules: Mapping[str, str]) -> l
         match levels.get(entry.code):
             case "error" | "warning" as severity:
                 result.append(replace(entry, severity=severity))
-            case None | "":  # as of an entry that sets a limit only
+            case None | "":  # the entry sets only a limit
                 result.append(entry)
     return result
 
@@ -282,11 +283,11 @@ def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
     return findings
 
 
-_OF_AN_ENTRY = 2  # its section and its name
+_OF_AN_ENTRY = 2  # length of an entry's path: section and name
 
 
 def add_replaced_notes(findings: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
-    """Return the findings with notes about the values that their values replaced."""
+    """Add notes about values that an overlay replaced to the findings about their new values."""
     overlaid = [source for source in sources if source.replaced]
     if not overlaid:
         return list(findings)
@@ -300,15 +301,15 @@ def _with_notes(finding: Finding, sources: Iterable[Source]) -> tuple[Note, ...]
     return notes
 
 
-def _notes(finding: Finding, known: set[Span | None], source: Source) -> list[Note]:
-    """Return notes about the value at the finding's place.
+def _notes(finding: Finding, spans: set[Span | None], source: Source) -> list[Note]:
+    """Return notes about the replaced value at the finding's span.
 
-    If none is there, about those of the entry as a whole.
+    If no value there was replaced, return the notes about the complete entry.
     """
     exact, around = [], []
     for path, (old, *_) in source.replaced.items():
         now = source.exact_span(path)
-        if now is None or finding.span is None or old in known:
+        if now is None or finding.span is None or old in spans:
             continue
         if now.holds(finding.span) or finding.span == source.key_span(path):
             exact.append(Note("it replaces this value", old))
@@ -321,5 +322,5 @@ def _notes(finding: Finding, known: set[Span | None], source: Source) -> list[No
 
 
 def _places_of_entry(entry: Path, source: Source) -> set[Span]:
-    """Return where findings about the whole of an entry are placed: its key, and its parent."""
+    """Return the spans that a finding about a complete entry can have: its key and its parent."""
     return {source.key_span(entry), source.span_of((*entry, "parent"))}

@@ -1,4 +1,4 @@
-"""Rules about joints: limits, axes, mimics, and what ros2_control does with them."""
+"""Rules about joints: limits, axes, mimicking joints, and use by ros2_control."""
 
 from __future__ import annotations
 
@@ -27,7 +27,11 @@ def mimic_without_master(robot: Robot) -> Iterator[Finding]:
     names = {joint.name for joint in joints}
     fixed = {edge.joint_name for edge in robot.edges if edge.joint_name} - names
     for joint in joints:
-        if joint.mimic is not None and joint.mimic not in names and not robot.excuses(joint.mimic):
+        if (
+            joint.mimic is not None
+            and joint.mimic not in names
+            and not robot.tolerates(joint.mimic)
+        ):
             message = f"{joint.name}: unknown joint {joint.mimic} under mimic"
             advice = "name a joint that moves, or remove mimic"
             if joint.mimic in fixed:
@@ -42,14 +46,14 @@ def mimic_loop(robot: Robot) -> Iterator[Finding]:
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     done: set[str] = set()
     for start in joints:
-        path: dict[str, None] = {}  # in order, and quick to look up
+        path: dict[str, None] = {}  # keys only: keeps the order, and lookup is fast
         name: str | None = start
         while name in joints and name not in done and name not in path:
             path[name] = None
             name = joints[name].mimic
         if name in path:
             loop = list(path)[list(path).index(name) :]
-            notes = [Note(f"{other} is defined here", joints[other].span) for other in loop[1:]]
+            notes = [Note(f"{member} is defined here", joints[member].span) for member in loop[1:]]
             message = f"joints mimic each other: {' → '.join([*loop, loop[0]])}"
             yield finding(
                 "TF702",
@@ -74,7 +78,7 @@ def joint_without_limits(robot: Robot) -> Iterator[Finding]:
         )
         lax = joint.limit is not None and robot.is_foreign(
             joint.span
-        )  # where one end may be missing
+        )  # a <limit> of a URDF may lack one end
         if len(ends) == 2 or (lax and ends):  # noqa: PLR2004 (lower and upper)
             continue
         usual = (
@@ -129,7 +133,7 @@ def zero_limit(robot: Robot) -> Iterator[Finding]:
                 yield finding("TF706", message, joint.limit_at or joint.span, help=advice)
 
 
-#: The error of two decimals: [0.71, 0.71, 0] has length 1.004.
+#: Tolerance for an axis with two decimals: [0.71, 0.71, 0] has length 1.004.
 _AXIS_TOLERANCE = 0.02
 
 
@@ -144,7 +148,7 @@ def axis_not_unit(robot: Robot) -> Iterator[Finding]:
             yield finding("TF707", message, span, help=f"the unit vector is [{axis}]")
 
 
-#: No more joints are followed than this.
+#: Maximum number of joints to follow.
 _MOST_MIMICS = 100
 
 
@@ -163,6 +167,7 @@ def mimic_chain(robot: Robot) -> Iterator[Finding]:
             continue
         multiplier = joint.multiplier * middle.multiplier
         offset = joint.multiplier * middle.offset + joint.offset
+        offset -= multiplier * joints[middle.mimic].zero_offset  # not in the file's values
         end = f", offset: {offset:g}" if offset else ""
         message = f"{joint.name} mimics {middle.name}, which mimics {middle.mimic}"
         notes = [Note(f"{middle.name} is defined here", middle.span)]
@@ -174,7 +179,7 @@ def mimic_chain(robot: Robot) -> Iterator[Finding]:
 
 
 def _loops(joints: dict[str, Joint], name: str) -> bool:
-    """Whether the joint mimics itself in the end; that is TF702."""
+    """Return whether following ``mimic`` from the joint leads into a loop, which TF702 reports."""
     passed: set[str] = set()
     while name in joints and name not in passed and len(passed) < _MOST_MIMICS:
         passed.add(name)
@@ -199,7 +204,7 @@ def joint_without_owner(robot: Robot) -> Iterator[Finding]:
             yield finding("TF715", message, edge.owner_at or joint.span, help=advice)
 
 
-#: Soft limits half a turn outside of both limits are switched off.
+#: Soft limits that exceed both limits by half a turn disable the safety controller.
 _FAR_OUTSIDE_RAD = math.pi
 
 
@@ -214,7 +219,7 @@ def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
         hard = (limit.lower, limit.upper) if limit else (None, None)
         inside = (hard[0] is None or hard[0] <= low) and (hard[1] is None or high <= hard[1])
         if low + _FAR_OUTSIDE_RAD < (hard[0] or 0) and (hard[1] or 0) < high - _FAR_OUTSIDE_RAD:
-            continue  # on purpose: they hold nothing back
+            continue  # the author disabled the soft limits on purpose
         if joint.type != "continuous" and not (inside and low < high):
             message = f"{joint.name}: soft limits {low:g} to {high:g} are not within its limits"
             advice = "set soft_lower_limit and soft_upper_limit to values between lower and upper"
@@ -229,13 +234,13 @@ def interface_claimed_twice(robot: Robot) -> Iterator[Finding]:
             for way, interfaces in (("command", component.command), ("state", component.state)):
                 for interface in interfaces:
                     claim = (component.name, way, interface.name)
-                    other, span = first.setdefault(claim, (hardware.name, component.span))
+                    claimant, span = first.setdefault(claim, (hardware.name, component.span))
                     if span != component.span:
                         message = (
-                            f"{hardware.name} and {other} both have the {way} interface"
+                            f"{hardware.name} and {claimant} both have the {way} interface"
                             f" {claim[0]}/{claim[2]}"
                         )
-                        notes = [Note(f"{other} has it here", span)]
+                        notes = [Note(f"{claimant} has it here", span)]
                         yield finding(
                             "TF717",
                             message,
@@ -282,11 +287,11 @@ def joint_named_like_a_frame(robot: Robot) -> Iterator[Finding]:
     }
     named.pop("", None)
     if named:
-        first, *others = named
+        first, *further = named
         kind = "link" if first in robot.links else "frame"
         notes = [Note(f"the {kind} is defined here", robot.frames[first])]
-        notes += [Note(f"so has {name}", named[name]) for name in others[:_MOST_LISTED]]
-        more = f", and {len(others)} more {'have' if others[1:] else 'has'}" if others else ""
+        notes += [Note(f"so has {name}", named[name]) for name in further[:_MOST_LISTED]]
+        more = f", and {len(further)} more {'have' if further[1:] else 'has'}" if further else ""
         message = f"joint {first} has the same name as a {kind}{more}"
         yield finding(
             "TF728", message, named[first], help=f"name it {first}_joint, for example", notes=notes
@@ -308,7 +313,7 @@ def negative_damping(robot: Robot) -> Iterator[Finding]:
                 yield finding("TF731", message, joint.span, help="give 0 or more, or remove it")
 
 
-#: Verbs for the axis of joints that do not turn.
+#: Verb phrases for the axes of joints that do not rotate.
 _ABOUT = {"prismatic": "moves along", "planar": "lies across"}
 
 
@@ -326,9 +331,10 @@ def joint_without_axis(robot: Robot) -> Iterator[Finding]:
         yield finding("TF736", message, joint.span, help=advice)
 
 
-#: A revolute finger or slide that moves by less, in rad, has its limits in metres.
+#: If a revolute finger or slide moves by less than this, in rad, its limits are in metres.
 _LEAST_REVOLUTE_RAD = 0.12
-#: A slide is no longer, in m, where its limits are a whole part of a turn.
+#: Names of joints that usually slide. Prismatic limits that span a fraction of a full turn are
+#: probably in rad.
 _SLIDES = re.compile(
     r"finger|grip|jaw|claw|slid|prismatic|linear|rail|telescop|lift|elevator|extension"
 )
@@ -346,7 +352,7 @@ def limits_of_another_type(robot: Robot) -> Iterator[Finding]:
         low, high = joint.limit.lower, joint.limit.upper
         if low is None or high is None or low >= high:
             continue
-        at, span = joint.limit_at or joint.span, high - low
+        place, span = joint.limit_at or joint.span, high - low
         foreign = robot.is_foreign(joint.span)
         if (
             joint.type == "revolute"
@@ -359,7 +365,7 @@ def limits_of_another_type(robot: Robot) -> Iterator[Finding]:
             )
             advice = f"if it slides by {span:g} m, write type{'=' if foreign else ': '}"
             advice += '"prismatic"' if foreign else "prismatic"
-            yield finding("TF734", message, at, help=advice)
+            yield finding("TF734", message, place, help=advice)
         elif joint.type == "prismatic" and any(
             abs(abs(end) - part) < _ROUNDED * part for end in (low, high) for part in _ANGLES_RAD
         ):
@@ -368,7 +374,7 @@ def limits_of_another_type(robot: Robot) -> Iterator[Finding]:
             )
             advice = f"if it turns, write type{'=' if foreign else ': '}"
             advice += '"revolute"' if foreign else "revolute"
-            yield finding("TF734", message, at, help=advice)
+            yield finding("TF734", message, place, help=advice)
 
 
 _FINGER = re.compile(r"finger|grip|jaw|claw|knuckle")
@@ -385,8 +391,8 @@ def fingers_move_alike(robot: Robot) -> Iterator[Finding]:
         first[edge.child] = edge
         if twin is None or twin.parent != edge.parent or twin.joint is None:
             continue
-        here, there = _opening(edge), _opening(twin)
-        if sum(a * b for a, b in zip(here, there, strict=True)) < _ALIKE:
+        opening, twin_opening = _opening(edge), _opening(twin)
+        if sum(a * b for a, b in zip(opening, twin_opening, strict=True)) < _ALIKE:
             continue
         is_same_place = edge.pose == twin.pose
         verb = "slide" if joint.type == "prismatic" else "turn"
@@ -399,9 +405,9 @@ def fingers_move_alike(robot: Robot) -> Iterator[Finding]:
 
 
 def _opening(edge: Edge) -> Vector:
-    """Return the direction in the parent in which a finger moves from the pose at zero.
+    """Return the direction in which the finger opens from its zero pose, in the parent frame.
 
-    With its sign by the limits, or by the multiplier of what it mimics.
+    The limits determine the sign; for a mimicking joint, the multiplier does.
     """
     joint = edge.joint
     if joint is None:

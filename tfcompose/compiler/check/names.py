@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 _GOOD = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
-#: Names that URDF and TF accept, and a person can type.
+#: Names that URDF and TF accept and that a user can type.
 _TAKEN = r"[\w.:+@-]+(/[\w.:+@-]+)*"
-#: Names that no listener can look up, or no XML file can hold.
+#: Names that no TF listener can look up, or that an XML file cannot contain.
 _LOST = r"(?s)|/.*|\s.*|.*\s|.*[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff].*"
 _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
 _LAUNCHER = "tfcompose"
@@ -38,7 +38,7 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
             is_foreign = robot.is_foreign(span)
             is_accepted = bool(re.fullmatch(_TAKEN, name))
             if is_accepted and is_foreign and name not in moving and name not in robot.frames:
-                continue  # nothing is named after a fixed joint
+                continue  # ROS does not use the name of a fixed joint
             is_accepted = is_accepted or (is_foreign and not re.fullmatch(_LOST, name))
             yield _invalid(name, span, "name", "warning" if is_accepted else "error")
     for process in robot.processes:
@@ -94,16 +94,16 @@ def upper_case_name(robot: Robot) -> Iterator[Finding]:
         and (name.lower() in robot.frames or not robot.is_foreign(span))
     }
     if bad:
-        first, *others = bad
-        known = {name.lower(): name for name in robot.frames if name == name.lower()}
-        more = f" and {len(others)} more" if others else ""
+        first, *further = bad
+        frames = {name.lower(): name for name in robot.frames if name == name.lower()}
+        more = f" and {len(further)} more" if further else ""
         message = f"upper case letters in frame name {first}{more}"
         notes = [
             Note(f"{name} and {lower} are two frames", span)
             for name, span in bad.items()
-            if (lower := known.get(name.lower()))
+            if (lower := frames.get(name.lower()))
         ]
-        notes += [Note(f"also in {name}", bad[name]) for name in others[:_MOST_LISTED]]
+        notes += [Note(f"also in {name}", bad[name]) for name in further[:_MOST_LISTED]]
         yield finding("TF503", message, bad[first], help=_lower_case(first), notes=notes)
 
 

@@ -1,4 +1,4 @@
-"""Rules about optical frames: each camera has one, rotated as REP-103 requires."""
+"""Rules about optical frames: each camera has an optical frame, rotated as REP-103 requires."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 _TOLERANCE_RAD = 2e-3
 
 _QUARTERS = (0.0, math.pi / 2, math.pi, -math.pi / 2)
-#: All rotations by right angles, several times over.
+#: All rotations by right angles, with repetitions.
 _RIGHT_ANGLES = tuple(quat_from_rpy(*angles) for angles in itertools.product(_QUARTERS, repeat=3))
 
-#: Names of frames with x forward and z up that are no camera's.
+#: Names of frames with x forward and z up that do not belong to a camera.
 _BASES = frozenset({"base_link", "base_footprint", "base", "chassis_link", "body_link"})
-#: Words in names of camera bodies, of what holds a camera, and of what ends an arm, whose z points
-#: forward.
+#: Words in the names of camera bodies; then of bodies that hold a camera; then of the last link of
+#: an arm, whose z axis points forward.
 _CAMERA_WORDS = frozenset(
     {"cam", "camera", "color", "colour", "depth", "lens", "rgb", "rgbd", "stereo"}
 )
@@ -45,7 +45,7 @@ _HOLDER_WORDS = frozenset(
 _END_OF_ARM = re.compile(
     r"(^|_)(tool\d*|flange|tcp|ee|eef|hand|gripper|wrist|palm|link_?\d+)(_|$)"
 )
-#: An optical axis steeper than this looks at the sky.
+#: A camera whose optical axis is steeper looks at the sky.
 _STEEP_RAD = math.radians(45)
 
 
@@ -64,7 +64,7 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
         edits = edge.optical_edits()
         if _is_base(edge.parent, robot) and not _is_at(
             quat_xyzw, IDENTITY_XYZW
-        ):  # where it should look is not known
+        ):  # the intended viewing direction is unknown
             advice, edits = (
                 (
                     f"{advice}, if that looks forward; give a camera that looks elsewhere a body"
@@ -88,7 +88,7 @@ def camera_upside_down(robot: Robot) -> Iterator[Finding]:
 
 
 def _edges_turned_otherwise(robot: Robot) -> Iterator[Edge]:
-    """Yield the edges to optical frames whose rotation is neither optical nor intended."""
+    """Yield edges to optical frames whose rotation is not optical and probably unintended."""
     above = {edge.child: edge for edge in robot.edges}
     for edge in robot.edges:
         if (
@@ -105,9 +105,9 @@ def _edges_turned_otherwise(robot: Robot) -> Iterator[Edge]:
 
 
 def _is_upside_down(edge: Edge, robot: Robot) -> bool:
-    """Return whether the image of a camera that looks forward is upside down.
+    """Return whether a camera looks forward and its image is upside down.
 
-    On the robot's base a camera may look in any direction.
+    If the parent is the robot's base, every horizontal viewing direction counts as forward.
     """
     quat_xyzw = edge.pose.quat_xyzw
     view, down = rotate(quat_xyzw, (0.0, 0.0, 1.0)), rotate(quat_xyzw, (0.0, 1.0, 0.0))
@@ -122,10 +122,10 @@ def _optical_rotation(edge: Edge, robot: Robot) -> str:
 
 
 def _is_optical_in_camera(edge: Edge, above: Mapping[str, Edge]) -> bool:
-    """Return whether the frame is optical in its parent, or higher in its camera.
+    """Return whether the frame has an optical rotation in a frame of its camera.
 
-    Passed on the way are frames that are named after the camera, and those that are rotated like
-    optical frames themselves.
+    The search goes from the frame's parent upwards. It passes frames named after the camera and
+    frames that have an optical rotation themselves.
     """
     quat_xyzw, step, passed = edge.pose.quat_xyzw, edge, {edge.child}
     while not _is_at(quat_xyzw, OPTICAL_XYZW):
@@ -146,7 +146,7 @@ def _is_optical_in_camera(edge: Edge, above: Mapping[str, Edge]) -> bool:
 
 
 def _is_wrong(edge: Edge, robot: Robot) -> bool:
-    """Return whether a rotation that is not optical is hardly intended."""
+    """Return whether the edge's rotation, which is not optical, is probably a mistake."""
     quat_xyzw, parent = edge.pose.quat_xyzw, edge.parent.rpartition("/")[2]
     if _is_named_after(edge.child, edge.parent):
         return True
@@ -169,19 +169,19 @@ def _is_base(frame: str, robot: Robot) -> bool:
     return frame == robot.base or frame.rpartition("/")[2] in _BASES
 
 
-def _is_at(quat_xyzw: Quaternion, wanted: Quaternion) -> bool:
-    return angle_between(quat_xyzw, wanted) <= _TOLERANCE_RAD
+def _is_at(quat_xyzw: Quaternion, rotation: Quaternion) -> bool:
+    return angle_between(quat_xyzw, rotation) <= _TOLERANCE_RAD
 
 
 def _is_named_after(optical: str, frame: str) -> bool:
-    """Return whether the frame is named as a body of the optical frame's camera."""
+    """Return whether ``frame`` is named like the body of the optical frame's camera."""
     return _stem(optical).startswith(_stem(frame))
 
 
 def _stem(frame: str) -> str:
-    """Return what a frame and its optical frame have in common.
+    """Return the common part of the names of a camera's frame and its optical frame.
 
-    Camera_link, camera_optical_frame → camera.
+    For camera_link and camera_optical_frame that is camera.
     """
     for ending in (*OPTICAL_ENDINGS, "_link", "_frame"):
         if frame.endswith(ending):

@@ -1,4 +1,4 @@
-"""Rules about who publishes an edge, how often, and what else may publish it."""
+"""Rules about edges: their owner, their rate, and other nodes that may publish them."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ if TYPE_CHECKING:
 def edge_with_two_owners(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], Edge] = {}
     for edge in robot.edges:
-        other = first.setdefault((edge.parent, edge.child), edge)
-        if other.owner != edge.owner:
-            message = f"edge {edge.name} has two owners: {other.owner} and {edge.owner}"
-            notes = [Note(f"{other.owner} owns it here", other.owner_at or other.span)]
+        first_edge = first.setdefault((edge.parent, edge.child), edge)
+        if first_edge.owner != edge.owner:
+            message = f"edge {edge.name} has two owners: {first_edge.owner} and {edge.owner}"
+            notes = [
+                Note(f"{first_edge.owner} owns it here", first_edge.owner_at or first_edge.span)
+            ]
             span = edge.owner_at or edge.span
             yield finding(
                 "TF301",
@@ -34,7 +36,7 @@ def edge_with_two_owners(robot: Robot) -> Iterator[Finding]:
             )
 
 
-#: ROS's own programs, which tfcompose replaces.
+#: Stock ROS programs that tfcompose replaces.
 STOCK = frozenset({"robot_state_publisher", "static_transform_publisher", "joint_state_publisher"})
 
 
@@ -43,9 +45,9 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
     names = {process.name: None for process in robot.processes}
     lost: dict[
         tuple[str, Span], list[Edge]
-    ] = {}  # a part's owner owns many edges, and is one typo
+    ] = {}  # report an owner once: a part's owner may own many edges
     for edge in robot.edges:
-        if edge.owner not in names and not robot.excuses(edge.owner):
+        if edge.owner not in names and not robot.tolerates(edge.owner):
             lost.setdefault((edge.owner, edge.owner_at or edge.span), []).append(edge)
     for (owner, span), edges in lost.items():
         declare = (
@@ -72,7 +74,7 @@ def owner_cannot_publish(robot: Robot) -> Iterator[Finding]:
     processes = {process.name: process for process in robot.processes}
     for edge in robot.edges:
         process = processes.get(edge.owner)
-        if process is None or (edge.free and edge.owner in BUILT_IN):  # TF715 says that
+        if process is None or (edge.free and edge.owner in BUILT_IN):  # TF715 reports it
             continue
         reason = ""
         if process.kind == "guard":
@@ -92,7 +94,9 @@ def owner_cannot_publish(robot: Robot) -> Iterator[Finding]:
 @rule("TF305")
 def static_edge_with_rate(robot: Robot) -> Iterator[Finding]:
     for edge in robot.edges:
-        refused = robot.excuses(edge.owner) or robot.excuses(edge.child)  # its owner may have been
+        refused = robot.tolerates(edge.owner) or robot.tolerates(
+            edge.child
+        )  # the owner may have been rejected
         if edge.kind == "static" and edge.rate is not None and not refused:
             message = (
                 f"{edge.name} is fixed, and sent once: the rate of {edge.rate:g} Hz has no meaning"
@@ -116,10 +120,15 @@ def one_node_two_levels(robot: Robot) -> Iterator[Finding]:
     upper = {edge.child: edge for edge in robot.edges if _is_edge(edge, "map", {"odom"})}
     for edge in robot.edges:
         if _is_edge(edge, "odom", {"base_link", "base_footprint"}) and edge.owner in owners:
-            other = upper.get(edge.parent)
-            if other and other.owner == edge.owner:
-                message = f"{edge.owner} publishes both {other.name} and {edge.name}"
-                notes = [Note(f"{other.name} is defined here", other.owner_at or other.span)]
+            upper_edge = upper.get(edge.parent)
+            if upper_edge and upper_edge.owner == edge.owner:
+                message = f"{edge.owner} publishes both {upper_edge.name} and {edge.name}"
+                notes = [
+                    Note(
+                        f"{upper_edge.name} is defined here",
+                        upper_edge.owner_at or upper_edge.span,
+                    )
+                ]
                 advice = "use one process for localisation and another for odometry"
                 yield finding(
                     "TF306", message, edge.owner_at or edge.span, help=advice, notes=notes
@@ -146,7 +155,7 @@ def _is_edge(edge: Edge, parent: str, children: set[str]) -> bool:
     return edge.parent.rpartition("/")[2] == parent and edge.child.rpartition("/")[2] in children
 
 
-#: Lowest rates in Hz of the edges that navigation looks up for every scan and every control step.
+#: Minimum rates, in Hz, of edges that navigation looks up for each scan and each control step.
 _LEAST_HZ = {
     ("odom", "base_link"): 20.0,
     ("odom", "base_footprint"): 20.0,
@@ -197,7 +206,7 @@ def driver_publishes_too(robot: Robot) -> Iterator[Finding]:
 
 
 def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
-    """Whether the plan switches it off, or starts nothing that could publish."""
+    """Return whether the plan disables the driver's TF output, or starts no driver."""
     command_line = " ".join(process.argv).lower()
     return process.kind not in {"run", "external"} or (
         process.kind == "run"
@@ -210,12 +219,12 @@ def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
 
 
 def _is_switched_on(process: Process, switch: dict[str, Any]) -> bool:
-    """Return whether a parameter or argument fails to switch the driver off."""
+    """Return whether a parameter or argument sets the switch to another value than ``switch``."""
     command_line = " ".join(process.argv).lower()
-    others = [
+    differs = [
         process.params[key] != value for key, value in switch.items() if key in process.params
     ]
-    return any(others) or any(
+    return any(differs) or any(
         f"{key}:=" in command_line and f"{key}:={value}".lower() not in command_line
         for key, value in switch.items()
     )
@@ -288,18 +297,18 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
         most = _most_hz(process)
         if most is None:
             continue
-        wanted = [
+        rates = [
             (edge.rate or 0.0, f"{edge.name} needs", edge.rate_at or edge.span)
             for edge in robot.edges
             if edge.joint and edge.owner == process.name
         ]
-        if wanted:
-            wanted += [
+        if rates:
+            rates += [
                 (process.simulate.rate, f"{process.name} sends", process.span)
                 for process in robot.processes
                 if process.simulate and process.simulate.kind == "joints"
             ]
-        rate, what, span = max(wanted, default=(0.0, "", process.span), key=lambda each: each[0])
+        rate, what, span = max(rates, default=(0.0, "", process.span), key=lambda each: each[0])
         if rate > most:
             message = (
                 f"{process.name} publishes joint states with at most {most:g} Hz, but {what}"
@@ -320,9 +329,9 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
 
 
 def _most_hz(process: Process) -> float | None:
-    """Return the limit on the rate of the joint states that the process publishes, in Hz.
+    """Return the maximum rate in Hz at which the process publishes joint states.
 
-    None: no limit, or none.
+    None if the process has no maximum rate or publishes no joint states.
     """
     stock = process.package == _STOCK
     most = process.params.get("publish_frequency", _STOCK_HZ if stock else None)
@@ -364,9 +373,9 @@ def clocks_mixed(robot: Robot) -> Iterator[Finding]:
                 f"{node.name} has use_sim_time: {str(value).lower()}, but the robot's clock is"
                 f" {robot.ros.clock}"
             )
-            at, *inside = node.places.get("use_sim_time", (node.span,))
+            place, *inside = node.places.get("use_sim_time", (node.span,))
             notes = [Note("it is set here", span) for span in inside]
             way_out = f"write use_sim_time: {str(sim).lower()} beside file: it takes precedence"
             way_out = way_out if inside else "remove use_sim_time"
             advice = f"{way_out}; or set ros: {{clock: {'wall' if sim else 'sim'}}}"
-            yield finding("TF335", message, at, help=advice, notes=notes)
+            yield finding("TF335", message, place, help=advice, notes=notes)

@@ -1,4 +1,4 @@
-"""Rules about sensor placement: views that the robot blocks, and zones to cover."""
+"""Rules about sensor placement: views that the robot blocks, and zones that sensors must cover."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ KINDS = ("camera", "lidar", "radar", "ultrasonic")
 
 
 def _limit(robot: Robot, code: str) -> float:
-    known = CATALOGUE[code].limit
-    return robot.limits.get(code, known[0] if known else 0.0)
+    limit = CATALOGUE[code].limit
+    return robot.limits.get(code, limit[0] if limit else 0.0)
 
 
 @dataclass(slots=True)
 class _Views:
-    """Surroundings of a robot's frames, their edges, and the views of its sensors."""
+    """The surroundings and edges of a robot's frames, and the views of its sensors."""
 
     robot: Robot
     around: Surroundings
@@ -56,7 +56,7 @@ class _Views:
         return self.of_sensors[sensor.name]
 
     def _is_placed(self, sensor: MountedSensor) -> bool:
-        """Return whether it has a pose; at the origin of the base it is not mounted yet."""
+        """Return whether the sensor has a pose. At the base's origin it counts as not placed."""
         edge = self.edges.get(sensor.mount)
         if edge is None or not edge.pose_known:
             return False
@@ -65,13 +65,13 @@ class _Views:
         )
 
 
-#: Views of the most recent robot, which several rules need one after the other.
+#: Views of the last robot. Several rules use them in sequence.
 _LAST: list[_Views] = []
 
 
 def _views_of(robot: Robot) -> _Views:
     if not _LAST or _LAST[0].robot is not robot:
-        edges = {edge.child: edge for edge in reversed(robot.edges)}  # a child's first
+        edges = {edge.child: edge for edge in reversed(robot.edges)}  # a child's first edge wins
         _LAST[:] = [_Views(robot, Surroundings(robot), edges)]
     return _LAST[0]
 
@@ -104,10 +104,12 @@ def sensor_inside_body(robot: Robot) -> Iterator[Finding]:
                 )
                 message += f"; the limit is {100 * limit:g} cm"
                 advice = f"correct the pose, or give {link} a shape with an opening"
-                yield finding("TF640", message, sensor.span, help=advice, notes=_at(robot, link))
+                yield finding(
+                    "TF640", message, sensor.span, help=advice, notes=_note_link(robot, link)
+                )
 
 
-def _at(robot: Robot, link: str) -> list[Note]:
+def _note_link(robot: Robot, link: str) -> list[Note]:
     return [Note(f"{link} is defined here", robot.links[link].span)]
 
 
@@ -129,7 +131,11 @@ def view_blocked(robot: Robot) -> Iterator[Finding]:
             message += f"{_some(worst.blocking)}; the limit is {_percent(limit)}"
             advice = "move or turn the sensor, or raise the limit under rules"
             yield finding(
-                "TF641", message, sensor.span, help=advice, notes=_at(robot, worst.blocking[0])
+                "TF641",
+                message,
+                sensor.span,
+                help=advice,
+                notes=_note_link(robot, worst.blocking[0]),
             )
 
 
@@ -151,14 +157,18 @@ def blind_sector(robot: Robot) -> Iterator[Finding]:
                 )
                 advice = "move the scanner, or raise the limit under rules"
                 yield finding(
-                    "TF642", message, sensor.span, help=advice, notes=_at(robot, view.blocking[0])
+                    "TF642",
+                    message,
+                    sensor.span,
+                    help=advice,
+                    notes=_note_link(robot, view.blocking[0]),
                 )
 
 
 def _largest_blind(view: View) -> tuple[float, float] | None:
-    """Return the largest sector in which every ray is blocked, or None.
+    """Return the largest sector in which a body blocks every ray, None without such a sector.
 
-    One may go on over the end of a turn.
+    The sector may cross the angle where a full turn starts and ends.
     """
     if view.optics.horizontal is None or not view.directions:
         return None
@@ -198,12 +208,16 @@ def camera_sees_only_robot(robot: Robot) -> Iterator[Finding]:
                 )
                 advice = "correct the pose: x of the body frame points where it looks"
                 yield finding(
-                    "TF643", message, sensor.span, help=advice, notes=_at(robot, view.blocking[0])
+                    "TF643",
+                    message,
+                    sensor.span,
+                    help=advice,
+                    notes=_note_link(robot, view.blocking[0]),
                 )
                 break
 
 
-#: Cameras that are meant to look at the floor.
+#: Names of cameras that are intended to look at the floor.
 _AT_THE_FLOOR = re.compile(
     r"(^|_)(down|downward|floor|ground|bottom|belly|line|dock|flow|landing)(_|\d|$)"
 )
@@ -230,9 +244,9 @@ def camera_sees_only_floor(robot: Robot) -> Iterator[Finding]:
 
 
 def _reach_on_floor(robot: Robot, view: View) -> float | None:
-    """Return the largest distance at which a free ray hits the floor.
+    """Return the largest distance in metres at which an unblocked ray hits the floor.
 
-    None if one misses it, or no floor is known.
+    None if a ray misses the floor, or the floor's height is unknown.
     """
     if view.optics.kind != "camera" or not view.directions:
         return None
@@ -241,7 +255,7 @@ def _reach_on_floor(robot: Robot, view: View) -> float | None:
         return None
     poses = _views_of(robot).around.poses(view.optics.frame)
     wheels = [wheel for wheel in wheels if wheel in poses]
-    base = "base_footprint" if "base_footprint" in poses else robot.base
+    base = robot.ground if robot.ground in poses else robot.base
     if not wheels or base not in poses:
         return None
     up = rotate(poses[base].quat_xyzw, (0.0, 0.0, 1.0))
@@ -259,7 +273,7 @@ def _reach_on_floor(robot: Robot, view: View) -> float | None:
 
 
 def _lowest(robot: Robot, name: str, pose: Pose, up: Vector) -> float:
-    """Return the height of a wheel's lowest point above the stream; < 0 below it."""
+    """Return the height of the wheel's lowest point above the sensor's frame, in metres."""
     link = robot.links.get(name)
     shapes = (link.collisions or link.visuals) if link else ()
     radii = [shape.size[0] for shape in shapes if shape.kind in {"cylinder", "sphere"}]
@@ -280,43 +294,43 @@ def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
     around = _views_of(robot).around
     reported = set()
     for viewer, viewed in itertools.combinations(active, 2):
-        (sensor_a, of_one), (other, of_other) = viewer, viewed
+        (sensor_a, optics_a), (sensor_b, optics_b) = viewer, viewed
         if (
-            sensor_a is other
-            or of_one.kind != of_other.kind
-            or (sensor_a.name, other.name) in reported
+            sensor_a is sensor_b
+            or optics_a.kind != optics_b.kind
+            or (sensor_a.name, sensor_b.name) in reported
         ):
             continue
-        there, back = _sight(around, of_one, of_other), _sight(around, of_other, of_one)
-        if there is None or back is None:
+        forth, back = _sight(around, optics_a, optics_b), _sight(around, optics_b, optics_a)
+        if forth is None or back is None:
             continue
-        far = math.hypot(*there)
+        far = math.hypot(*forth)
         if (
             far <= limit
-            and _is_open(around, viewer, viewed, there)
+            and _is_open(around, viewer, viewed, forth)
             and _is_open(around, viewed, viewer, back)
         ):
-            reported.add((sensor_a.name, other.name))
+            reported.add((sensor_a.name, sensor_b.name))
             message = (
-                f"{sensor_a.name} and {other.name} look into each other, {far:.2g} m apart; the"
+                f"{sensor_a.name} and {sensor_b.name} look into each other, {far:.2g} m apart; the"
                 f" limit is {limit:g} m"
             )
             notes = [Note(f"{sensor_a.name} is defined here", sensor_a.span)]
             advice = "turn one away, or mount them at different heights"
-            yield finding("TF645", message, other.span, help=advice, notes=notes)
+            yield finding("TF645", message, sensor_b.span, help=advice, notes=notes)
 
 
 def _is_light(optics: Optics) -> bool:
     return optics.kind in {"camera", "lidar"}
 
 
-#: Height of a scanner's window, which another scanner's plane has to meet.
+#: Height of a scanner's window. Another scanner dazzles it if its scan plane meets the window.
 _WINDOW_M = 0.03
 
 
-def _sight(around: Surroundings, optics: Optics, other: Optics) -> Vector | None:
-    """Return the other stream's origin in the stream's frame, None if it is out of its field."""
-    pose = around.pose(optics.frame, other.frame)
+def _sight(around: Surroundings, optics: Optics, target: Optics) -> Vector | None:
+    """Return the other stream's origin in this stream's frame, None outside its field of view."""
+    pose = around.pose(optics.frame, target.frame)
     if pose is None or math.hypot(*pose.xyz) < _WINDOW_M:
         return None
     x, y, z = pose.xyz
@@ -330,12 +344,15 @@ def _is_open(
     viewed: tuple[MountedSensor, Optics],
     origin: Vector,
 ) -> bool:
-    """Return whether no body is between two streams. ``origin`` is that of the viewed one."""
+    """Return whether no body blocks the line between two streams.
+
+    ``origin`` is the viewed stream's origin.
+    """
     (sensor, optics), (of_other, _) = viewer, viewed
     (x, y, z), far = origin, math.hypot(*origin)
     into = ((x / far, y / far, z / far),)
-    own = (of_other.mount, *of_other.frames)
-    bodies = around.bodies(sensor, optics.frame, into, min(far, reach_of(optics)), own)
+    frames = (of_other.mount, *of_other.frames)
+    bodies = around.bodies(sensor, optics.frame, into, min(far, reach_of(optics)), frames)
     return cast(sensor.name, optics, into, bodies).rays[0].distance >= far
 
 
@@ -343,7 +360,7 @@ def _is_open(
 def zone_not_covered(robot: Robot) -> Iterator[Finding]:
     for zone in robot.zones:
         if zone.frame not in robot.frames:
-            if not robot.excuses(zone.frame):
+            if not robot.tolerates(zone.frame):
                 advice = did_you_mean(zone.frame, robot.frames)
                 yield finding(
                     "TF646",
@@ -385,7 +402,7 @@ _GRID = (10, 10, 4)
 
 
 def _coverage_of(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
-    """Return the seen part of the zone's points, and streams without known optics."""
+    """Return the covered fraction of the zone's points, and the streams with unknown optics."""
     points = [
         tuple(
             middle + extent * ((index + 0.5) / count - 0.5)
@@ -425,7 +442,7 @@ def _coverage_of(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
 def _aim(optics: Optics, zone: Zone, point: Sequence[float], pose: Pose) -> Vector | None:
     """Return the point in the stream's frame.
 
-    For a scanner where its plane meets the zone below or above the point.
+    For a scanner, return the point above or below it where the scan plane meets the zone.
     """
     x, y, z = point
     bx, by, bz = rotate(pose.quat_xyzw, (x, y, z))
@@ -442,9 +459,9 @@ def _aim(optics: Optics, zone: Zone, point: Sequence[float], pose: Pose) -> Vect
 
 
 def _is_in_reach(optics: Optics, point: Vector) -> bool:
-    """Return whether the point is in the field of view and in range.
+    """Return whether the point is in the stream's field of view and range.
 
-    Of depth along z for a camera.
+    A camera's range is the depth along z.
     """
     far = abs(point[2]) if optics.kind == "camera" else math.hypot(*point)
     return (

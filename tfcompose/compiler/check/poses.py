@@ -1,7 +1,4 @@
-"""Rules about poses: units, conventions of REP-103, and likely typing errors.
-
-``poses_in_base`` returns the poses of frames in the base.
-"""
+"""Rules about poses: units, conventions of REP-103, and likely typing errors."""
 
 from __future__ import annotations
 
@@ -23,8 +20,8 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Link, MountedSensor, Robot
 
 
-#: Degrees that people write. Read as radians, all but 5 exceed a full turn, which is never
-#: intended.
+#: Typical angles in degrees. Read as radians, all but 5 exceed a full turn, so the user cannot
+#: have intended radians.
 _ROUND_DEG = frozenset(
     {
         5.0,
@@ -45,12 +42,12 @@ _ROUND_DEG = frozenset(
         135.0,
     }
 )
-#: As limits, -5 to 5 and -10 to 10 are radians: two or three turns, or none that is known.
+#: Limits from -5 to 5 or from -10 to 10 are radians: two or three turns, or no real limit.
 _ROUND_LIMITS_DEG = _ROUND_DEG - {5.0, 10.0}
-#: No joint with limits turns farther than the first value, except a reel, whose limits are not
-#: round. Limits beyond the second mean that there are none.
+#: No joint with limits turns farther than the first value, except a reel. The limits of a reel are
+#: not round numbers. Limits beyond the second value mean that the joint has no limit.
 _FARTHEST_RAD, _MOST_LIMIT_DEG = 20.0, 720.0
-#: No joint with limits turns faster.
+#: Maximum velocity of any joint with limits.
 _FASTEST_RAD_S = 45.0
 #: A full turn, with a margin for rounding.
 _FULL_CIRCLE_RAD = 6.29
@@ -58,13 +55,11 @@ _FULL_CIRCLE_RAD = 6.29
 
 @rule("TF410", of_urdf=True)
 def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
-    revolute = {
-        edge.joint.name for edge in robot.edges if edge.joint and edge.joint.type == "revolute"
-    }
+    types = {edge.joint.name: edge.joint.type for edge in robot.edges if edge.joint}
+    angles = {"limit": {"revolute"}, "offset": {"revolute", "continuous"}}
     for value in robot.source_numbers:
-        is_limit = value.key == "limit"
-        if value.key not in {"rpy", "look", "axis_angle", "limit"} or (
-            is_limit and value.name not in revolute
+        if value.key not in {"rpy", "look", "axis_angle", *angles} or (
+            value.key in angles and types.get(value.name) not in angles[value.key]
         ):
             continue
         for index, (number, with_unit) in enumerate(
@@ -88,7 +83,10 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
 
 
 def _is_in_degrees(key: str, step: str | int, size: float) -> bool:
-    """Return whether a bare number of radians, at a key and a step in it, is one of degrees."""
+    """Return whether a number without a unit is probably in degrees.
+
+    ``key`` names the value that contains the number, and ``step`` the number in that value.
+    """
     if step == "velocity":
         return size >= _FASTEST_RAD_S
     if key == "limit":
@@ -98,7 +96,7 @@ def _is_in_degrees(key: str, step: str | int, size: float) -> bool:
     return size in _ROUND_DEG or size > _FULL_CIRCLE_RAD
 
 
-#: 1.5708 is good enough: it is 0.0002 degrees off, and no mount is that accurate.
+#: The rule accepts 1.5708. It is 0.0002 degrees off, and no mount is that accurate.
 _EXACT_RAD, _ROUNDED_RAD, _NOISE = 5e-6, 2e-3, 2e-9
 _QUARTERS = {1: "pi/2", 2: "pi", 3: "3*pi/2", 4: "2*pi"}
 _MOST_DECIMALS = 6
@@ -127,7 +125,7 @@ def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
 
 
 def _is_rounded(number: float) -> bool:
-    """Whether the number is a rounded multiple of π/2, and not the multiple itself."""
+    """Return whether the number is a rounded multiple of π/2 instead of the exact multiple."""
     quarters = round(number / (math.pi / 2))
     exact = quarters * math.pi / 2
     if (
@@ -142,7 +140,7 @@ def _is_rounded(number: float) -> bool:
     )
 
 
-#: A rotation with this w or more is smaller than 64 degrees.
+#: Rotations by less than 64 degrees have at least this w.
 _SMALL_ROTATION_W = 0.85
 
 
@@ -176,9 +174,10 @@ def _list_numbers(numbers: tuple[float, ...]) -> str:
 
 
 _X, _Z = 0, 2
-#: Words in a name, the axis of the base and its sign that they imply, and by how much (sine) the
-#: view may contradict it. "up" and "down" may also mean the upper and the lower camera, "front"
-#: and "rear" where it is mounted, so the contradiction must be clear.
+#: For each word in a sensor's name: the axis of the base and the sign that the word implies, and
+#: the sine by which the view may contradict the word. "up" and "down" may also mean the upper and
+#: the lower camera, and "front" and "rear" the position of the mount. For these words the
+#: contradiction must be clear.
 _VIEWS = {
     "floor": (_Z, -1, 0.1),
     "ground": (_Z, -1, 0.1),
@@ -193,14 +192,14 @@ _VIEWS = {
     "rear": (_X, -1, 0.8),
     "back": (_X, -1, 0.8),
 }
-#: View directions of a camera by axis and sign.
+#: A camera's viewing directions by axis and sign.
 _DIRECTIONS = {
     (_X, 1): "front",
     (_X, -1): "rear",
     (_Z, 1): "up",
     (_Z, -1): "down",
 }
-#: Above this a camera named after the ceiling is probably mounted there.
+#: Above this height, a camera with "ceiling" in its name is probably mounted on the ceiling.
 _OVERHEAD_M = 1.5
 
 
@@ -235,7 +234,10 @@ def camera_looks_away(robot: Robot) -> Iterator[Finding]:
 
 
 def _rotation_at(robot: Robot, sensor: MountedSensor) -> Span:
-    """Return the place of the rotation of a sensor's mount, or of the sensor without one."""
+    """Return the span of the rotation of a sensor's mount.
+
+    If the mount has no rotation, return the span of the sensor.
+    """
     places = (
         value.locate(0)
         for value in robot.source_numbers
@@ -253,7 +255,7 @@ def tilted_past_vertical(robot: Robot) -> Iterator[Finding]:
         for index, step in enumerate(value.steps if value.key == "look" else ()):
             angle = value.numbers[index]
             if step not in {"up", "down"} or not value.with_unit[index]:
-                continue  # without a unit it may be meant in degrees: TF410
+                continue  # without a unit the angle may be in degrees: TF410
             if abs(angle) <= math.pi / 2 + _ROUNDING_RAD:
                 continue
             degrees = math.degrees(angle)
@@ -265,10 +267,10 @@ def tilted_past_vertical(robot: Robot) -> Iterator[Finding]:
             yield finding("TF415", message, value.locate(index), help=advice)
 
 
-#: No part of an ordinary robot is farther from its mount; larger robots are known by their bodies
-#: and mounts.
+#: In an ordinary robot, no part is farther from its mount. Larger robots have larger bodies and
+#: mounts, from which the rule derives a larger limit.
 _USUAL_M = 5.0
-#: No robot is larger, unless it has a larger body.
+#: No robot is larger, unless one of its bodies is.
 _LARGEST_M = 100.0
 _TIMES = 3
 
@@ -343,9 +345,10 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
 
 
 def _unit_meant(distance: float, usual: float) -> tuple[str, float]:
-    """Return the unit, and how many are a metre, that brings a distance nearest to the usual one.
+    """Return the unit in which the distance comes nearest to the usual distance.
 
-    Without a usual distance they are millimetres, as in drawings.
+    The second value is the number of these units in a metre. If ``usual`` is 0, the unit is
+    millimetres, as in drawings.
     """
     units = (("mm", 1000.0), ("cm", 100.0))
     if not usual:
@@ -354,21 +357,21 @@ def _unit_meant(distance: float, usual: float) -> tuple[str, float]:
 
 
 def _sizes(link: Link) -> list[float]:
-    """Return the length of each shape of the link, but of meshes."""
+    """Return the longest side in metres of each of the link's shapes, except meshes."""
     shapes = (shape for shape in (*link.visuals, *link.collisions) if shape.kind != "mesh")
     return [max(size) for shape in shapes if (size := size_of(shape))]
 
 
-#: A mesh longer than the robot's longest edge by this factor is not in metres; a small robot may
-#: still have a mesh of the second length.
+#: If a mesh is longer than the robot's longest edge by this factor, its unit is not metres. Meshes
+#: up to the second length are always accepted.
 _MESH_TIMES, _LARGE_MESH_M = 20, 5.0
-#: Nothing to go by but the mesh: a hall or a field may be this long.
+#: Limit for a robot without edges: a hall or a field may be this long.
 _LONE_MESH_M = 50.0
-#: No mesh that is scaled down ends up smaller than the first, and no body than the second.
+#: Minimum length of a mesh with a scale below 1, and of any other mesh.
 _SMALL_MESH_M, _TINY_MESH_M = 0.005, 0.0005
-#: The mark of a frame is as long as wide, but for this part.
+#: A mesh marks a frame if its shortest side is longer than this fraction of its longest side.
 _CUBE = 0.99
-#: Ground planes are thinner than this part of their length.
+#: A ground plane is thinner than this fraction of its length.
 _FLAT = 1e-3
 
 
@@ -402,18 +405,18 @@ def _meshes_in_other_units(robot: Robot) -> Iterator[Finding]:
             yield finding("TF414", message, mesh.span, help=f"if the file {why}, write {advice}")
 
 
-#: The least and the greatest x, y, z.
+#: The minimum and maximum of x, y and z.
 Box = tuple[list[float], list[float]]
 
 #: Kinds of sensors that take images.
 CAMERAS = frozenset({"camera", "mono", "stereo", "rgbd", "tof"})
 
-#: Distance from the bodies within which a point counts as on the robot, in metres: the arm of a
-#: mount.
+#: Distance from the bodies, in metres, within which a point counts as on the robot. It allows for
+#: the arm of a mount.
 _REACH_M = 0.2
 
-#: Words in names of two sides, and the axis (0: x, 1: y) on which these differ; the first of each
-#: pair is on the positive side (REP-103).
+#: Pairs of words for opposite sides, and the axis on which these sides differ (0: x, 1: y). The
+#: first word of a pair is on the positive side (REP-103).
 _SIDES = (
     ("left", "right", 1),
     ("front", "rear", 0),
@@ -427,13 +430,14 @@ _SIDES = (
     ("fl", "bl", 0),
     ("fr", "br", 0),
 )
-#: These are found at the beginning of longer words, too: leftfinger.
+#: These words also count at the beginning of a longer word, such as leftfinger.
 _LONG_SIDES = ("left", "right")
 _SIDE_WORDS = {token for pair in _SIDES for token in pair[:2]}
 _NEAR_M = 1e-6
-#: Nearer to the middle than this, left and right may well be at one place.
+#: Distance from the robot's middle, in metres, below which the left and right frame may share a
+#: place.
 _MIDDLE_M = 0.01
-#: Two frames are a pair if each is this close to the other's mirror image.
+#: Two frames are a pair if each is this close to the other frame's mirror image.
 _MIRRORED_M = 0.001
 
 
@@ -456,61 +460,64 @@ def poses_in_base(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
 
 
 def twins(frame: str) -> Iterator[str]:
-    """Yield the possible names of the frame's mirror image: left_wheel_link → right_wheel_link."""
+    """Yield possible names of the mirrored frame: left_wheel_link → right_wheel_link."""
     tokens = frame.split("_")
     for index, token in enumerate(tokens):
         side, rest = _side_in(token)
         for first, second, _ in _SIDES:
             if side.lower() in {first, second}:
-                other = second if side.lower() == first else first
-                other = other.upper() if side.isupper() else other
-                yield "_".join([*tokens[:index], other + rest, *tokens[index + 1 :]])
+                opposite = second if side.lower() == first else first
+                opposite = opposite.upper() if side.isupper() else opposite
+                yield "_".join([*tokens[:index], opposite + rest, *tokens[index + 1 :]])
 
 
 def _side_in(token: str) -> tuple[str, str]:
-    """Return the side that a word of a name begins with, empty if it has none, and the rest."""
+    """Return the side that a word of a name begins with, and the rest of the word.
+
+    The side is empty if the word begins with no side.
+    """
     side = next((side for side in _LONG_SIDES if token.startswith(side)), token)
     return (side, token[len(side) :]) if side.lower() in _SIDE_WORDS else ("", token)
 
 
 def without_side(frame: str) -> str:
-    """Return the name with a star for each side: left_wheel_link → ``*_wheel_link``."""
+    """Return the name with each side replaced by a star: left_wheel_link → ``*_wheel_link``."""
     tokens = map(_side_in, frame.split("_"))
     return "_".join(f"{'*' * bool(side)}{rest}" for side, rest in tokens)
 
 
-def are_swapped(edge: Edge, other: Edge) -> bool:
-    """Return whether two frames are on the opposite sides of what their names say."""
-    axis, sign = side_of(edge.child, other.child)
-    here, there = edge.pose.xyz, other.pose.xyz
-    mirrored = list(there)
+def are_swapped(edge: Edge, twin: Edge) -> bool:
+    """Return whether each of two frames is on the side that the other frame's name states."""
+    axis, sign = side_of(edge.child, twin.child)
+    xyz, twin_xyz = edge.pose.xyz, twin.pose.xyz
+    mirrored = list(twin_xyz)
     mirrored[axis] = -mirrored[axis]
-    return sign * here[axis] < -_MIDDLE_M and math.dist(here, mirrored) < _MIRRORED_M
+    return sign * xyz[axis] < -_MIDDLE_M and math.dist(xyz, mirrored) < _MIRRORED_M
 
 
 def side_of(frame: str, twin: str) -> tuple[int, int]:
-    """Return the axis on which frame and twin differ, and the side in its name."""
+    """Return the axis on which frame and twin differ, and the sign that its name implies."""
     pairs = zip(frame.split("_"), twin.split("_"), strict=True)
-    here, there = next((_side_in(a)[0], _side_in(b)[0]) for a, b in pairs if a != b)
-    sides = {here.lower(), there.lower()}
+    side, twin_side = next((_side_in(a)[0], _side_in(b)[0]) for a, b in pairs if a != b)
+    sides = {side.lower(), twin_side.lower()}
     first, axis = next((pair[0], pair[2]) for pair in _SIDES if sides == {*pair[:2]})
-    return axis, 1 if here.lower() == first else -1
+    return axis, 1 if side.lower() == first else -1
 
 
-def are_mirrored(edge: Edge, other: Edge) -> bool:
+def are_mirrored(edge: Edge, twin: Edge) -> bool:
     """Return whether two frames named after two sides are at the same place."""
-    if edge.parent != other.parent or other.child not in twins(edge.child):
+    if edge.parent != twin.parent or twin.child not in twins(edge.child):
         return False
-    axis, _ = side_of(edge.child, other.child)
-    apart = math.dist(edge.pose.xyz, other.pose.xyz)
+    axis, _ = side_of(edge.child, twin.child)
+    apart = math.dist(edge.pose.xyz, twin.pose.xyz)
     return apart < _NEAR_M and abs(edge.pose.xyz[axis]) > _MIDDLE_M
 
 
 def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None:
-    """Return the least and greatest x, y, z in ``frame`` of the bodies fixed to it, in metres.
+    """Return the minimum and maximum of x, y and z of the bodies fixed to ``frame``.
 
-    Each shape counts with its bounding sphere. ``without`` names a sensor whose bodies are
-    ignored. None: there are no bodies, or one is an unreadable mesh.
+    Values are in metres, in ``frame``. Each shape counts with its bounding sphere. ``without``
+    names a sensor whose bodies are ignored. None if there are no bodies or a mesh is unreadable.
     """
     inside = {edge.child for edge in robot.edges if edge.sensor == without} if without else set()
     least, most = [math.inf] * 3, [-math.inf] * 3

@@ -1,6 +1,6 @@
 """Rules about frame prefixes.
 
-Nodes that look up frames need their names on the live tree.
+A node that looks up frames needs the names that the frames have on /tf.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _COSTMAP = {"global_frame": "map", "robot_base_frame": "base_link"}
 _FILTER = {"map_frame": "map", "odom_frame": "odom", "base_link_frame": "base_link"}
 _SLAM = {"map_frame": "map", "odom_frame": "odom", "base_frame": "base_footprint"}
-#: The frames that programs look up where no parameter names others (Nav2, slam_toolbox and
+#: Frames that programs look up by default, by parameter (Nav2, slam_toolbox and
 #: robot_localization, Jazzy).
 _DEFAULTS: dict[str, dict[str, str]] = {
     "controller_server": _COSTMAP,
@@ -54,7 +54,9 @@ def frame_without_prefix(robot: Robot) -> Iterator[Finding]:
             }
             if wrong:
                 yield _without_prefix(process, wrong, robot)
-        usual = {} if robot.excuses(process.name) else _DEFAULTS.get(process.executable or "", {})
+        usual = (
+            {} if robot.tolerates(process.name) else _DEFAULTS.get(process.executable or "", {})
+        )
         left = {
             key: frame
             for key, frame in usual.items()
@@ -78,5 +80,5 @@ def _without_prefix(process: Process, names: dict[str, str], robot: Robot) -> Fi
     message = (
         f"{process.name} looks frames up without the prefix {robot.ros.frame_prefix}: {listed}"
     )
-    wanted = ", ".join(f'{key}: "${{frame({value})}}"' for key, value in names.items())
-    return finding("TF318", message, process.span, help=f"params: {{{wanted}}}")
+    args = ", ".join(f'{key}: "${{frame({value})}}"' for key, value in names.items())
+    return finding("TF318", message, process.span, help=f"params: {{{args}}}")

@@ -1,4 +1,4 @@
-"""Rules about processes: conditions that they wait for, and processes without use."""
+"""Rules about processes: start conditions that cannot be met, and processes without a role."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
 
 
 def _needed_processes(robot: Robot) -> set[str]:
-    """Return the processes that matter to the tree, or are waited for.
+    """Return the processes that the tree needs, and those that another process waits for.
 
-    They own an edge, drive a sensor, or publish TF by default.
+    The tree needs a process that owns an edge, drives a sensor, or publishes TF by default.
     """
     publishers = {claim.node for claim in robot.claims}
     return (
@@ -73,7 +73,7 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
             process.kind not in {"external", "simulate"}
             or process.name in needed
             or process.loads
-            or robot.excuses(process.name)
+            or robot.tolerates(process.name)
         ):
             continue
         if process.kind == "external" and moving and not states:
@@ -95,7 +95,7 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
 def required_without_role(robot: Robot) -> Iterator[Finding]:
     needed = _needed_processes(robot)
     for process in robot.processes:
-        if process.required and process.name not in needed and not robot.excuses(process.name):
+        if process.required and process.name not in needed and not robot.tolerates(process.name):
             message = f"{process.name} is required, but owns no edge, and nothing waits for it"
             advice = (
                 f"remove required, or write after: {{{process.name}: ready}} on the process that"
@@ -213,7 +213,7 @@ def host_without_processes(robot: Robot) -> Iterator[Finding]:
             yield finding("TF858", f"no process runs on the host {name}", host.span, help=advice)
 
 
-#: A number, a space and what may be a unit.
+#: A number, a space, and a possible unit.
 _WITH_UNIT = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?) +(\S+)")
 
 

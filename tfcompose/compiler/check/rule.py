@@ -21,26 +21,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A code of the catalogue and the function that finds it."""
+    """A code of the catalogue, and the function that yields findings with this code."""
 
     code: str
     find: Find
     #: Whether the rule also applies to a robot without owners, sensors and processes.
     of_urdf: bool = False
-    #: The value that the finding follows from. If an entry's pose was refused, rules that follow
-    #: from the pose do not report that entry.
+    #: The value that the finding depends on. The rule skips an entry whose value was rejected.
     follows: Follows | None = None
-    #: Whether the rule reports unused entries. It is skipped when profiles or overlays are merged
-    #: over the robot, because the file alone may use them.
+    #: Whether the rule reports unused entries. ``check`` skips such a rule when profiles or
+    #: overlays are merged, because the file without them may use the entry.
     idle: bool = False
 
 
 def rule(
     code: str, *, of_urdf: bool = False, follows: Follows | None = None, idle: bool = False
 ) -> Callable[[Find], Rule]:
-    """Return a decorator that makes a function the rule of a code.
+    """Return a decorator that turns a function into the rule of a code.
 
-    The function has the catalogue's name for the code.
+    The function's name must be the catalogue's name of the code.
     """
 
     def make_rule(find: Find) -> Rule:

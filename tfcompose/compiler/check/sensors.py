@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Calibration, Edge, MountedSensor, Process, Robot
 
 
-#: Required ratio of the inverse's distance from the nominal pose, and its maximum as a multiple of
-#: the limit.
+#: A calibration is probably inverted if its inverse is closer to the nominal pose than the
+#: calibration by this factor, and within this multiple of the limit.
 _NEARER, _NEAR = 0.9, 3.0
 
 
@@ -57,7 +57,7 @@ def _if_inverse(measured: Calibration) -> str:
 
 
 def _why_inverse(robot: Robot, edge: Edge) -> str:
-    """Return what shows that the edge's calibration is inverted, or an empty string."""
+    """Return the evidence that the edge's calibration is inverted; empty without evidence."""
     measured = edge.calibration
     if measured is None or measured.entry == Pose():
         return ""
@@ -78,7 +78,7 @@ def _nearer(measured: Calibration, back: Pose) -> str:
 
 
 def _times_limit(measured: Calibration, pose: Pose) -> float:
-    """Return how far the pose is from nominal, as a multiple of the limit."""
+    """Return the pose's distance from the nominal pose, as a multiple of the limit."""
     far, turned = measured.off(pose)
     return max(far / (measured.limit_m or 1e-9), turned / (measured.limit_rad or 1e-9))
 
@@ -122,7 +122,10 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
 
 
 def _with_w_first(measured: Calibration) -> str:
-    """Return the quaternion as it is meant, if it fits the nominal pose with its w first."""
+    """Return the calibration's quaternion in the intended order, if its file lists w first.
+
+    Empty unless that order brings the rotation within the limit around the nominal pose.
+    """
     w, x, y, z = measured.entry.quat_xyzw
     swapped = Pose(measured.entry.xyz, (x, y, z, w))
     pose = swapped.inverse() if measured.inverted else swapped
@@ -133,7 +136,10 @@ def _with_w_first(measured: Calibration) -> str:
 
 
 def _nominal_with_w_first(measured: Calibration) -> str:
-    """Return the nominal quaternion as it is meant, if it fits the file with its w first."""
+    """Return the nominal quaternion in the intended order, if the robot file lists w first.
+
+    Empty unless that order brings the nominal rotation within the limit around the calibration.
+    """
     w, x, y, z = measured.nominal.quat_xyzw if measured.nominal else measured.pose.quat_xyzw
     turned = angle_between(measured.pose.quat_xyzw, (x, y, z, w))
     return f"[{x:g}, {y:g}, {z:g}, {w:g}]" if turned <= measured.limit_rad else ""
@@ -143,12 +149,12 @@ _OPTICAL = Pose((0.0, 0.0, 0.0), OPTICAL_XYZW)
 
 
 def _is_turned(measured: Calibration, rotation: Pose) -> bool:
-    """Return whether the nominal pose fits once it is turned further."""
+    """Return whether the nominal pose fits the calibration after another rotation."""
     turned = (measured.nominal or measured.pose) @ rotation
     return angle_between(measured.pose.quat_xyzw, turned.quat_xyzw) <= measured.limit_rad
 
 
-#: From here on angles are shown rounded to degrees.
+#: Angles of at least this are rounded to degrees.
 _ROUNDED_FROM_DEG = 10
 
 
@@ -179,7 +185,7 @@ def calibration_all_zero(robot: Robot) -> Iterator[Finding]:
 
 
 def _is_all_zero(measured: Calibration) -> bool:
-    """Return whether the calibration is all zero but its nominal pose is not."""
+    """Return whether the calibration is all zero although the nominal pose is not."""
     return (
         measured.entry == Pose() and measured.nominal is not None and max(measured.off(Pose())) > 0
     )
@@ -192,21 +198,22 @@ def calibration_copied(robot: Robot) -> Iterator[Finding]:
         measured = edge.calibration
         if measured is None or measured.entry == Pose():
             continue
-        other = first.setdefault(measured.entry, measured)
-        if other is not measured:
-            message = f"{measured.name} has the same values as that of {other.child}"
+        first_measured = first.setdefault(measured.entry, measured)
+        if first_measured is not measured:
+            message = f"{measured.name} has the same values as that of {first_measured.child}"
             notes = [
-                Note(f"{other.child} was measured here", other.span),
+                Note(f"{first_measured.child} was measured here", first_measured.span),
                 Note("measured here", measured.span),
             ]
             advice = "name each mount's own entry, or calibrate the second one"
             yield finding("TF618", message, measured.named_at, help=advice, notes=notes)
 
 
-#: Kinds that are built into other devices and may share their pose.
+#: Kinds of sensors that other devices contain, and that may share those devices' pose.
 _BUILT_IN_KINDS = frozenset({"imu", "gnss"})
 _SAME_M, _SAME_RAD = 1e-6, 1e-6
-#: A parent that is turned by more has other sides than the base.
+#: If the parent is rotated by more, left and right in the parent differ from left and right in the
+#: base.
 _TURNED_RAD = 0.02
 
 
@@ -223,11 +230,13 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
         if edge.calibration or kinds[edge.sensor or ""] in _BUILT_IN_KINDS:
             continue
         position = (edge.parent, *(round(part / _SAME_M) for part in edge.pose.xyz))
-        other = first.setdefault(position, edge)
-        turned = angle_between(edge.pose.quat_xyzw, other.pose.quat_xyzw)
-        if other is not edge and turned < _SAME_RAD and not are_mirrored(other, edge):
-            message = f"{edge.sensor} and {other.sensor} are at the same pose in {edge.parent}"
-            notes = [Note(f"{other.sensor} is mounted here", other.span)]
+        first_edge = first.setdefault(position, edge)
+        turned = angle_between(edge.pose.quat_xyzw, first_edge.pose.quat_xyzw)
+        if first_edge is not edge and turned < _SAME_RAD and not are_mirrored(first_edge, edge):
+            message = (
+                f"{edge.sensor} and {first_edge.sensor} are at the same pose in {edge.parent}"
+            )
+            notes = [Note(f"{first_edge.sensor} is mounted here", first_edge.span)]
             yield finding(
                 "TF621",
                 message,
@@ -243,8 +252,8 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
     for edge in robot.edges:
         if not edge.declared:
             continue
-        others = [mounts[name] for name in twins(edge.child) if name in mounts]
-        twin = next((other for other in others if are_mirrored(other, edge)), None)
+        candidates = [mounts[name] for name in twins(edge.child) if name in mounts]
+        twin = next((candidate for candidate in candidates if are_mirrored(candidate, edge)), None)
         mounts.setdefault(edge.child, edge)
         if twin:
             axis, sign = side_of(edge.child, twin.child)
@@ -276,9 +285,11 @@ def sides_swapped(robot: Robot) -> Iterator[Finding]:
             or angle_between(base.quat_xyzw, IDENTITY_XYZW) > _TURNED_RAD
         ):
             continue
-        others = [edges[name] for name in twins(edge.child) if name in edges]
+        candidates = [edges[name] for name in twins(edge.child) if name in edges]
         swapped = (
-            other for other in others if other.parent == edge.parent and are_swapped(other, edge)
+            candidate
+            for candidate in candidates
+            if candidate.parent == edge.parent and are_swapped(candidate, edge)
         )
         twin = next(swapped, None)
         edges[edge.child] = edge
@@ -294,7 +305,7 @@ def sides_swapped(robot: Robot) -> Iterator[Finding]:
             yield finding("TF625", message, edge.xyz_at or edge.span, help=advice, notes=notes)
 
 
-#: Parts of parameter names that tell two devices apart as a serial number does.
+#: Parts of parameter names whose values, like a serial number, identify a device.
 _DEVICE_WORDS = ("serial", "usb_port", "device_type", "device_id", "mxid", "guid", "mac", "ip")
 
 
@@ -318,27 +329,27 @@ def serial_missing(robot: Robot) -> Iterator[Finding]:
             for sensor in group
             if not (
                 sensor.serial
-                or robot.excuses(sensor.name)
+                or robot.tolerates(sensor.name)
                 or _names_device(processes[sensor.driver])
             )
         ]
         if len(group) == 1 or not nameless:
             continue
         sensor = nameless[0]
-        others = [other for other in group if other is not sensor]
+        siblings = [sibling for sibling in group if sibling is not sensor]
         same = "the same driver"
         if len(nameless) > 1:
             names = list_names([each.name for each in nameless])
             message = f"{names} have no serial numbers, and {same}"
         else:
-            message = f"{sensor.name} has no serial number, and {others[0].name} has {same}"
-        notes = [Note(f"{other.name} is defined here", other.span) for other in others]
+            message = f"{sensor.name} has no serial number, and {siblings[0].name} has {same}"
+        notes = [Note(f"{sibling.name} is defined here", sibling.span) for sibling in siblings]
         advice = f'add options: {{{sensor.serial_option}: "…"}}'
         yield finding("TF623", message, sensor.span, help=advice, notes=notes)
 
 
 def _names_device(process: Process) -> bool:
-    """Whether a parameter names the device."""
+    """Return whether a parameter of the process identifies its device."""
     return any(
         hint in re.split(r"[_.]", key) or (len(hint) > _SHORT_WORD and hint in key)
         for key in process.params
@@ -352,48 +363,51 @@ _SHORT_WORD = 3
 @rule("TF624")
 def serial_used_twice(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], MountedSensor] = {}
-    found: set[str] = set()
+    visited: set[str] = set()
     for sensor in robot.sensors:
         if sensor.serial:
-            other = first.setdefault((sensor.preset.partition("/")[0], str(sensor.serial)), sensor)
-            if other is not sensor:
-                found.add(sensor.driver)
+            first_sensor = first.setdefault(
+                (sensor.preset.partition("/")[0], str(sensor.serial)), sensor
+            )
+            if first_sensor is not sensor:
+                visited.add(sensor.driver)
                 message = (
-                    f"{sensor.name} and {other.name} have the same serial number {sensor.serial}"
+                    f"{sensor.name} and {first_sensor.name} have the same serial number"
+                    f" {sensor.serial}"
                 )
-                notes = [Note(f"{other.name} is defined here", other.span)]
+                notes = [Note(f"{first_sensor.name} is defined here", first_sensor.span)]
                 advice = "correct the number of one of the two"
                 yield finding("TF624", message, sensor.span, help=advice, notes=notes)
-    yield from _addresses_used_twice(robot, found)
+    yield from _addresses_used_twice(robot, visited)
 
 
-#: Names of parameters that locate a device.
+#: Names of parameters that contain a device's address.
 _ADDRESSES = re.compile(
     r"(?:.*_)?(?:port|ip|ip_addr|ip_address|host|hostname|device|device_id|device_path"
     r"|serial_no|serial_number|video_device|usb_port_id|mxid|guid)"
 )
-#: Serial lines and cameras can be opened by one process only.
+#: Device files that only one process can open: serial ports and cameras.
 _EXCLUSIVE = re.compile(r"/dev/(?:tty|video|serial/)\w.*")
 _ARGUMENT = re.compile(r"([\w.]+):=(.+)")
 
 
-def _addresses_used_twice(robot: Robot, found: set[str]) -> Iterator[Finding]:
-    """Yield a finding for each process that opens a device of one before it, on one host."""
+def _addresses_used_twice(robot: Robot, visited: set[str]) -> Iterator[Finding]:
+    """Yield a finding for each process that opens the device of an earlier process on its host."""
     addresses = {
         process.name: _addresses(process)
         for process in robot.processes
-        if process.kind in {"run", "component", "external"} and process.name not in found
+        if process.kind in {"run", "component", "external"} and process.name not in visited
     }
     before: list[Process] = []
     for process in robot.processes:
         mine = addresses.get(process.name)
         if not mine:
             continue
-        for other in before:
-            key = _shared_parameter(process, other, mine, addresses[other.name])
+        for peer in before:
+            key = _shared_parameter(process, peer, mine, addresses[peer.name])
             if key:
-                message = f"{process.name} and {other.name} have the same {key} {mine[key]}"
-                notes = [Note(f"{other.name} is defined here", other.span)]
+                message = f"{process.name} and {peer.name} have the same {key} {mine[key]}"
+                notes = [Note(f"{peer.name} is defined here", peer.span)]
                 advice = f"correct {key} of one of the two"
                 severity: Severity = "error" if _EXCLUSIVE.fullmatch(mine[key]) else "warning"
                 yield finding(
@@ -404,7 +418,7 @@ def _addresses_used_twice(robot: Robot, found: set[str]) -> Iterator[Finding]:
 
 
 def _addresses(process: Process) -> dict[str, str]:
-    """Return what the process's parameters and arguments say about where its device is."""
+    """Return the device addresses in the process's parameters and arguments, by name."""
     arguments = [
         match.groups() for argument in process.argv if (match := _ARGUMENT.fullmatch(argument))
     ]
@@ -417,16 +431,16 @@ def _addresses(process: Process) -> dict[str, str]:
 
 
 def _shared_parameter(
-    process: Process, other: Process, mine: dict[str, str], theirs: dict[str, str]
+    process: Process, peer: Process, mine: dict[str, str], theirs: dict[str, str]
 ) -> str | None:
-    """Return the parameter that names one device for both, if one does."""
-    if process.host != other.host:
+    """Return the parameter that names the same device for both processes, None without one."""
+    if process.host != peer.host:
         return None
     for key, value in mine.items():
         if _EXCLUSIVE.fullmatch(value) and value in theirs.values():
             return key
     program = _program(process)
-    are_alike = any(program) and program == _program(other) and mine == theirs
+    are_alike = any(program) and program == _program(peer) and mine == theirs
     return next(iter(mine)) if are_alike else None
 
 

@@ -1,6 +1,6 @@
 """Rules about stock TF publishers among a robot's processes.
 
-Their command lines tell which edges they publish.
+The rules find out from a process's command line which edges it publishes.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Process, Robot
 
 _STATIC_PUBLISHER, _STATE_PUBLISHER = "static_transform_publisher", "robot_state_publisher"
-#: The child of a joint in a description.
+#: A joint's child in a robot description.
 _CHILD = re.compile(r"<child\s+link\s*=\s*[\"']([^\"']+)[\"']")
-#: The sections whose entries can name an owner.
+#: Sections whose entries can name an owner.
 _WITH_OWNERS = frozenset({"frames", "links", "joints", "sensors", "parts"})
-#: Number of arguments of the forms without options: a position, angles or a quaternion, and the
-#: two frames.
+#: Number of positional arguments, with angles and with a quaternion. Both forms have a position
+#: and the two frames.
 _WITH_ANGLES, _WITH_QUATERNION = 8, 9
 
 
@@ -41,7 +41,7 @@ def stock_publisher_publishes_too(robot: Robot) -> Iterator[Finding]:
 
 
 def _program(process: Process) -> str:
-    """Return the name of the program that the process runs, empty if that is not known."""
+    """Return the name of the program that the process runs; empty if unknown."""
     if process.kind != "run" or process.launch is not None:
         return ""
     if process.executable is not None:
@@ -53,13 +53,13 @@ def _of_static_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     names = _frames_of(_own_arguments(process))
     if names is None:
         return
-    known = {robot.final(frame): frame for frame in robot.frames}
-    parent, child = (known.get(name, name) for name in names)
+    frames_by_final = {robot.final(frame): frame for frame in robot.frames}
+    parent, child = (frames_by_final.get(name, name) for name in names)
     edge = robot.parent_edge(child)
-    if robot.excuses(child) or (
+    if robot.tolerates(child) or (
         edge and edge.owner not in {process.name for process in robot.processes}
     ):
-        return  # it was refused, or its owner was
+        return  # the edge or its owner was rejected
     if edge is None:
         message = f"{process.name} publishes {parent} → {child}, which is not declared"
         advice = f"replace it by frames: {{{child}: {{parent: {parent}, xyz: […], rpy: […]}}}}"
@@ -69,15 +69,15 @@ def _of_static_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
 
 
 def _own_arguments(process: Process) -> list[str]:
-    """Return the program's own arguments, without ROS's."""
+    """Return the program's arguments without ROS arguments."""
     argv = list(process.argv if process.executable is not None else process.argv[1:])
     return argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
 
 
 def _frames_of(argv: list[str]) -> tuple[str, str] | None:
-    """Return parent and child from a static_transform_publisher's command line.
+    """Return parent and child from the arguments of static_transform_publisher.
 
-    In its old form or the new.
+    Both the form with options and the older positional form are accepted.
     """
     if "--frame-id" in argv or any(argument.startswith("--frame-id=") for argument in argv):
         parent, child = _option(argv, "--frame-id"), _option(argv, "--child-frame-id")
@@ -104,22 +104,22 @@ def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     mine = {edge.child for edge in robot.edges if edge.owner == process.name}
     refused = any(
         section in _WITH_OWNERS for section, _ in robot.broken
-    )  # its own edge may be among them
-    if text is None and (mine or refused or robot.excuses(process.name)):
+    )  # the refused edges may include its own
+    if text is None and (mine or refused or robot.tolerates(process.name)):
         return
     children = {*_CHILD.findall(text)} if text is not None else robot.described_frames()
     prefix = params.get("frame_prefix", "")
-    known = {robot.final(frame): frame for frame in robot.frames}
+    frames_by_final = {robot.final(frame): frame for frame in robot.frames}
     if prefix or text is not None:
-        sent = {known.get(f"{prefix}{name}") for name in children}
+        sent = {frames_by_final.get(f"{prefix}{name}") for name in children}
     else:
-        sent = {known.get(robot.final(name)) for name in children}
-    others = [
+        sent = {frames_by_final.get(robot.final(name)) for name in children}
+    contested = [
         edge
         for edge in robot.edges
         if edge.child in sent - mine and edge.owner in {STATIC, JOINTS}
     ]
-    edges = [edge for edge in others if not robot.excuses(edge.child)]
+    edges = [edge for edge in contested if not robot.tolerates(edge.child)]
     if edges:
         yield _publishes_too(
             process, with_more(edges[0].name, len(edges) - 1), edges[0], sure=text is not None
@@ -127,7 +127,7 @@ def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
 
 
 def _params_on_the_command_line(process: Process) -> dict[str, str]:
-    """Return what ``-p NAME:=VALUE`` among ROS's arguments sets, each value as it is written."""
+    """Return the parameters that ``-p NAME:=VALUE`` sets, with their values as text."""
     argv = itertools.dropwhile(lambda argument: argument != "--ros-args", process.argv)
     assignments = [
         value for option, value in itertools.pairwise(argv) if option in {"-p", "--param"}

@@ -21,10 +21,15 @@ if TYPE_CHECKING:
 def two_parents(robot: Robot) -> Iterator[Finding]:
     first: dict[str, Edge] = {}
     for edge in robot.edges:
-        other = first.setdefault(edge.child, edge)
-        if other.parent != edge.parent:
-            message = f"{edge.child} has two parents: {other.parent} and {edge.parent}"
-            notes = [Note(f"{other.name} is defined here, owned by {other.owner}", other.span)]
+        first_edge = first.setdefault(edge.child, edge)
+        if first_edge.parent != edge.parent:
+            message = f"{edge.child} has two parents: {first_edge.parent} and {edge.parent}"
+            notes = [
+                Note(
+                    f"{first_edge.name} is defined here, owned by {first_edge.owner}",
+                    first_edge.span,
+                )
+            ]
             advice = "remove one of the two edges, or swap parent and child of one"
             yield finding("TF201", message, edge.span, notes=notes, help=advice)
 
@@ -34,7 +39,7 @@ def cycle(robot: Robot) -> Iterator[Finding]:
     above = {edge.child: edge for edge in reversed(robot.edges)}
     done: set[str] = set()
     for start in above:
-        path: dict[str, None] = {}  # in order, and quick to look up
+        path: dict[str, None] = {}  # keys only: keeps the order, and lookup is fast
         frame = start
         while frame in above and frame not in done and frame not in path:
             path[frame] = None
@@ -78,8 +83,8 @@ def cycle(robot: Robot) -> Iterator[Finding]:
                 )
 
 
-#: Maximum number of names for which the nearest one is searched: among thousands this takes long,
-#: and thousands are not typos.
+#: Maximum number of unknown names for which the rule searches the nearest frame. A search among
+#: thousands of frames is slow, and thousands of unknown names are not typing errors.
 _MOST_SEARCHES = 50
 
 
@@ -102,7 +107,11 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
 
     for edge in robot.edges:
         for parent in (edge.parent, *edge.switched) if edge.declared else ():
-            if parent not in robot.frames and parent not in invalid and not robot.excuses(parent):
+            if (
+                parent not in robot.frames
+                and parent not in invalid
+                and not robot.tolerates(parent)
+            ):
                 message = f"{edge.child}: unknown parent frame {parent}"
                 section = "links" if parent in moved else "frames"
                 yield finding(
@@ -111,7 +120,7 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
                     edge.span,
                     help=advice(parent, edge.span, section, edge.child),
                 )
-        if edge.child not in robot.frames and not robot.excuses(edge.child):
+        if edge.child not in robot.frames and not robot.tolerates(edge.child):
             span = edge.child_at or edge.span
             message = f"joint {edge.joint_name}: unknown child link {edge.child}"
             yield finding("TF203", message, span, help=advice(edge.child, span, "links"))
@@ -122,7 +131,7 @@ def several_roots(robot: Robot) -> Iterator[Finding]:
     grown = _trees(robot)
     main = _main_root(robot, grown)
     for root, frames in grown.items():
-        if root != main and len(frames) > 1 and not robot.excuses(root):
+        if root != main and len(frames) > 1 and not robot.tolerates(root):
             span = robot.frames[root]
             message = (
                 f"{root} is not connected to {main}: it is the root of a separate tree with"
@@ -145,10 +154,10 @@ def several_roots(robot: Robot) -> Iterator[Finding]:
 def edge_given_twice(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], Edge] = {}
     for edge in robot.edges:
-        other = first.setdefault((edge.parent, edge.child), edge)
+        first_edge = first.setdefault((edge.parent, edge.child), edge)
         has_owners = not robot.is_foreign(edge.span)
-        if other is not edge and not (has_owners and other.owner != edge.owner):
-            notes = [Note("first defined here", other.span)]
+        if first_edge is not edge and not (has_owners and first_edge.owner != edge.owner):
+            notes = [Note("first defined here", first_edge.span)]
             yield finding(
                 "TF205",
                 f"edge {edge.name} is defined twice",
@@ -168,11 +177,11 @@ def no_frames(robot: Robot) -> Iterator[Finding]:
         )
 
 
-#: From the world inwards, as REP-105 orders them. base_footprint and base_link are one level:
-#: TF208 is about the two.
+#: Levels of REP-105's frames, from the world to the robot. base_footprint and base_link share a
+#: level; TF208 checks their order.
 _LEVELS = {"earth": 0, "map": 1, "odom": 2, "base_footprint": 3, "base_link": 3}
 
-#: No more edges are followed upwards than this.
+#: Maximum number of edges to follow upwards.
 _MOST_ANCESTORS = 100
 
 
@@ -185,8 +194,8 @@ def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
         passed, parent = {edge.child}, edge.parent
         while level is not None and parent not in passed and len(passed) < _MOST_ANCESTORS:
             passed.add(parent)
-            other_prefix, other = _level(parent)
-            if other is not None and other > level and other_prefix in {prefix, ""}:
+            parent_prefix, parent_level = _level(parent)
+            if parent_level is not None and parent_level > level and parent_prefix in {prefix, ""}:
                 message = (
                     f"{edge.child} is below {parent}; REP-105 has {parent} below {edge.child}"
                 )
@@ -200,7 +209,7 @@ def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
 
 
 def _base_not_below_odom(robot: Robot) -> Iterator[Finding]:
-    """Yield a finding where odom and the base are on two branches below one frame."""
+    """Yield a finding if odom and the base are on two branches below the same frame."""
     for odom in robot.frames:
         prefix, _, name = odom.rpartition("/")
         around = robot.parent_edge(odom)
@@ -211,8 +220,8 @@ def _base_not_below_odom(robot: Robot) -> Iterator[Finding]:
             edge = robot.parent_edge(base)
             if edge is None or odom in edge.switched:
                 continue
-            others = robot.below(around.parent) - robot.below(odom)
-            if base in others and odom not in robot.below(base):
+            outside = robot.below(around.parent) - robot.below(odom)
+            if base in outside and odom not in robot.below(base):
                 message = f"{base} is beside {odom}, not below it: both are below {around.parent}"
                 notes = [Note(f"{odom} is defined here", around.span)]
                 advice = f"write {base}: {{parent: {odom}}}, which odometry publishes"
@@ -243,7 +252,7 @@ def unused_frame(robot: Robot) -> Iterator[Finding]:
     grown = _trees(robot)
     main = _main_root(robot, grown)
     for root, frames in grown.items():
-        if root != main and len(frames) == 1 and not robot.excuses(root):
+        if root != main and len(frames) == 1 and not robot.tolerates(root):
             span = robot.frames[root]
             message = (
                 f"{'link' if root in robot.links else 'frame'} {root} has neither a parent nor a"
@@ -262,18 +271,17 @@ def unused_frame(robot: Robot) -> Iterator[Finding]:
 
 
 def _trees(robot: Robot) -> dict[str, set[str]]:
-    """Return the frames of each root's tree, the root too, in the order of declaration.
+    """Return the frames of each root's tree, including the root, in order of declaration.
 
-    A frame with parents in two trees is in both; frames that are each other's ancestors are in
-    none.
+    A frame with parents in two trees is in both trees. Frames of a cycle are in no tree.
     """
     children = children_of((edge.parent, edge.child) for edge in robot.edges)
     return {root: below(children, root) for root in robot.roots()}
 
 
 def _main_root(robot: Robot, grown: dict[str, set[str]]) -> str:
-    """Return the root of the tree that holds the robot's base, or of the largest one.
+    """Return the root of the tree that holds the robot's base, otherwise of the largest tree.
 
-    Empty if there is none.
+    Empty if there is no tree.
     """
     return max(grown, key=lambda root: (robot.base in grown[root], len(grown[root])), default="")

@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Link, MountedSensor, Robot, Shape
 
 _WHEEL = re.compile(r"wheel|tyre|(?<![a-z])tire")
-#: Names of bodies that turn about an upright axis and may carry a wheel across it.
+#: Names of bodies that turn about a vertical axis and may carry a wheel.
 _SWIVEL = re.compile(r"caster|castor|swivel|steer|pivot|fork")
-#: The cosine of 10 degrees: axes nearer to each other are parallel.
+#: The cosine of 10 degrees. Axes within this angle count as parallel.
 _PARALLEL = math.cos(math.radians(10))
 _Z = (0.0, 0.0, 1.0)
 #: Kinds of sensors that measure how a wheel turns.
 _ODOMETRY_KINDS = frozenset({"imu"})
-#: A sensor this far below the ground may be a rounding of the radius.
+#: A sensor may be this far below the ground because the wheel's radius is rounded.
 _UNDER_M = 0.01
 
 
 def is_wheel(robot: Robot, edge: Edge) -> bool:
-    """Return whether the edge turns a wheel: by its name, or by a flat cylinder around it."""
+    """Return whether the edge turns a wheel, by its name or by a flat cylinder around its axis."""
     if edge.joint is None or edge.joint.type != "continuous":
         return False
     names = f"{edge.child} {edge.joint.name}".lower()
@@ -49,7 +49,7 @@ def is_wheel(robot: Robot, edge: Edge) -> bool:
 
 
 def _cylinder(link: Link | None) -> Shape | None:
-    """Return the cylinder that is the link's only shape, as seen or for collision."""
+    """Return the cylinder that is the link's only visual shape or only collision shape."""
     for shapes in (link.visuals, link.collisions) if link else ():
         if len(shapes) == 1 and shapes[0].kind == "cylinder":
             return shapes[0]
@@ -57,7 +57,7 @@ def _cylinder(link: Link | None) -> Shape | None:
 
 
 def _disc(link: Link | None) -> Shape | None:
-    """Return the link's only cylinder, if it is flat and turns about its middle."""
+    """Return the link's only cylinder if it is flat and centred on the link's origin."""
     shape = _cylinder(link)
     if shape is None:
         return None
@@ -97,27 +97,27 @@ def wheel_axis(robot: Robot) -> Iterator[Finding]:
 
 
 def _lying(robot: Robot, edge: Edge, shape: Shape, along: Vector) -> Finding:
-    """Return the finding that a wheel's cylinder lies across its axis.
+    """Return the finding that a wheel's cylinder does not lie along its joint's axis.
 
-    It is about the cylinder if that lies as it was made, and else about the axis.
+    The finding is about the cylinder if the cylinder is not rotated, otherwise about the axis.
     """
     joint, link = edge.joint, robot.links[edge.child]
     axis = joint.axis if joint else along
-    here, there = joint.axis_at or joint.span if joint else edge.span, link.span
+    span, note_span = joint.axis_at or joint.span if joint else edge.span, link.span
     message = (
         f"{edge.child} turns about {_list_axis(axis)}; its cylinder lies along {_list_axis(along)}"
     )
     key = _axis(robot, edge, along)
     advice, what = f"write {key}, or turn the cylinder", f"{edge.child} is defined here"
     if shape.pose.quat_xyzw == Pose().quat_xyzw:
-        here, there, what = there, here, "it turns here"
+        span, note_span, what = note_span, span, "it turns here"
         advice = f"a cylinder is made along z: turn it by {_quarter(robot, edge, axis)} beside it"
         advice += f", or write {key}"
-    return finding("TF733", message, here, help=advice, notes=[Note(what, there)])
+    return finding("TF733", message, span, help=advice, notes=[Note(what, note_span)])
 
 
 def _quarter(robot: Robot, edge: Edge, axis: Vector) -> str:
-    """Return what to write for a quarter turn that lays z along x or y."""
+    """Return the text of a quarter turn that rotates z to ``axis``, which is along x or y."""
     index = 0 if abs(axis[1]) > abs(axis[0]) else 1
     angles = ["0", "0", "0"]
     if robot.is_foreign(edge.span):
@@ -135,10 +135,11 @@ def _axis(robot: Robot, edge: Edge, axis: Vector) -> str:
 
 
 def _odd_axes(robot: Robot, wheels: list[Edge]) -> dict[str, tuple[Edge, Vector]]:
-    """Return the wheels whose axis is unlike their siblings', with one of these and its axis.
+    """Return wheels whose axis differs from their siblings' axes.
 
-    Siblings differ only in the side in their names. Of two wheels the odd one is that whose axis
-    does not lead to the other. The axis is in the odd wheel's frame.
+    Each comes with a sibling and the sibling's axis in the odd wheel's frame. The names of
+    siblings differ only in the side. If only two wheels are siblings, the odd wheel is the one
+    whose axis does not point to the other wheel.
     """
     poses = poses_in_base(robot, moving=True)
     groups: dict[str, list[Edge]] = {}
@@ -151,20 +152,20 @@ def _odd_axes(robot: Robot, wheels: list[Edge]) -> dict[str, tuple[Edge, Vector]
             rotate(poses[edge.child].quat_xyzw, edge.joint.axis) for edge in group if edge.joint
         ]
         for index, edge in enumerate(group):
-            others = axes[:index] + axes[index + 1 :]
-            if len(others) == 1:
-                ends = (poses[other.child].xyz for other in group)
+            other_axes = axes[:index] + axes[index + 1 :]
+            if len(other_axes) == 1:
+                ends = (poses[wheel.child].xyz for wheel in group)
                 between = [a - b for a, b in zip(*ends, strict=True)]
                 length = norm(tuple(between))
-                others += [tuple(part / length for part in between)] if length else []
-            alike = all(_are_parallel(a, b) for a, b in itertools.combinations(others, 2))
-            if len(others) > 1 and alike and not _are_parallel(axes[index], others[0]):
+                other_axes += [tuple(part / length for part in between)] if length else []
+            alike = all(_are_parallel(a, b) for a, b in itertools.combinations(other_axes, 2))
+            if len(other_axes) > 1 and alike and not _are_parallel(axes[index], other_axes[0]):
                 back = poses[edge.child].inverse().quat_xyzw
-                odd[edge.child] = (group[index - 1], rotate(back, others[0]))
+                odd[edge.child] = (group[index - 1], rotate(back, other_axes[0]))
     return odd
 
 
-#: Wheels of a pair are mirrored to a millimetre.
+#: Tolerance for the mirrored positions of a pair of wheels.
 _MIRRORED_M = 1e-3
 
 
@@ -180,11 +181,11 @@ def wheels_not_mirrored(robot: Robot) -> Iterator[Finding]:
             off = [abs(x - twin_x), abs(z - twin_z), abs(y + twin_y) if y * twin_y < 0 else 0.0]
             if edge.parent != twin.parent or axis != 1 or max(off) <= _MIRRORED_M:
                 continue
-            others = [wheel for wheel in wheels.values() if wheel not in (edge, twin)]
-            if any(are_mirrored(side, other) for side in (edge, twin) for other in others):
+            remaining = [wheel for wheel in wheels.values() if wheel not in (edge, twin)]
+            if any(are_mirrored(side, wheel) for side in (edge, twin) for wheel in remaining):
                 continue  # TF622
             odd, pattern = edge, twin
-            if _is_alike(edge, others) and not _is_alike(twin, others):
+            if _is_alike(edge, remaining) and not _is_alike(twin, remaining):
                 odd, pattern = twin, edge
             right = (pattern.pose.xyz[0], -pattern.pose.xyz[1], pattern.pose.xyz[2])
             message = f"{odd.child} is not at the mirrored position of {pattern.child}"
@@ -194,13 +195,13 @@ def wheels_not_mirrored(robot: Robot) -> Iterator[Finding]:
             yield finding("TF738", message, odd.xyz_at or odd.span, help=advice, notes=notes)
 
 
-def _is_alike(wheel: Edge, others: Sequence[Edge]) -> bool:
-    """Return whether one of the others is as high, and as far from the middle, as the wheel."""
+def _is_alike(wheel: Edge, wheels: Sequence[Edge]) -> bool:
+    """Return whether another wheel has the same height and distance from the middle."""
     _, y, z = wheel.pose.xyz
-    places = (other.pose.xyz for other in others)
+    places = (candidate.pose.xyz for candidate in wheels)
     return any(
-        abs(abs(y) - abs(other[1])) <= _MIRRORED_M and abs(z - other[2]) <= _MIRRORED_M
-        for other in places
+        abs(abs(y) - abs(place[1])) <= _MIRRORED_M and abs(z - place[2]) <= _MIRRORED_M
+        for place in places
     )
 
 
@@ -237,7 +238,7 @@ def sensor_below_ground(robot: Robot) -> Iterator[Finding]:
 
 
 def _height_at(robot: Robot, sensor: MountedSensor, edge: Edge) -> Span:
-    """Return the place of the z of a sensor's mount."""
+    """Return the span of the z coordinate of a sensor's mount."""
     places = (
         value.locate(2)
         for value in robot.source_numbers
@@ -247,7 +248,7 @@ def _height_at(robot: Robot, sensor: MountedSensor, edge: Edge) -> Span:
 
 
 def _bottom(link: Link | None, pose: Pose) -> float | None:
-    """Return the least z of a wheel at a pose, None where it has no round shape."""
+    """Return the lowest z of a wheel at a pose, None if the wheel has no round shape."""
     heights = []
     for shape in (*link.visuals, *link.collisions) if link else ():
         here = pose @ shape.pose

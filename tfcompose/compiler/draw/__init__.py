@@ -1,4 +1,4 @@
-"""Drawings of a TF tree as SVG, PNG, DOT and Mermaid, from a plain description.
+"""Pictures of a TF tree as SVG, PNG, DOT and Mermaid, drawn from a ``Graph``.
 
 Lengths are CSS px (1/96 inch).
 """

@@ -1,9 +1,9 @@
 """Arrangement of a picture: to the right, down, or in columns.
 
-Columns place the subtrees below the first branching frame side by side. The frames above it form a
-row on top. From there one line runs along the top of all columns and down on the left of each, so
-that no edge crosses a box. Subtrees keep their shape and their order: down the first column, then
-the next.
+In columns, the frames above the first branching frame form a row at the top. The subtrees below
+that frame follow in columns. One line runs along the top of all columns and down the left side of
+each, so that no edge crosses a box. Each subtree keeps its shape. The subtrees fill the first
+column from top to bottom, then the next column.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ Direction = Literal["auto", "right", "down", "columns"]
 WIDEST, WIDEST_RATIO = (
     1600.0,
     3.0,
-)  # a picture is drawn downwards if it is wider, also in relation to its height
+)  # a wider picture is drawn downwards; the second is a limit on width / height
 TALLEST, TALLEST_RATIO = (
     900.0,
     1.5,
-)  # and in columns if it is taller, also in relation to its width
+)  # a taller picture is drawn in columns; the second is a limit on height / width
 MOST_COLUMNS = 8
 COLUMN_GAP = 24.0
 FROM_LINE = 22.0  # from the line on the left of a column to its frames
 
 
 def arrange(graph: Graph, forest: Forest, direction: Direction = "auto") -> Layout:
-    """Return the position of everything, from (0, 0).
+    """Return the position of each frame and group, with the top left corner at (0, 0).
 
-    ``auto`` goes to the right unless the picture is too wide or too tall.
+    ``auto`` draws to the right unless the picture would be too wide or too tall.
     """
     if direction == "down":
         return layout(graph, forest, is_down=True)
@@ -50,7 +50,7 @@ def arrange(graph: Graph, forest: Forest, direction: Direction = "auto") -> Layo
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A subtree: its frames and areas, and its extent in the picture to the right."""
+    """A subtree: its frames and areas, and its bounds in the picture drawn to the right."""
 
     frames: tuple[str, ...]
     areas: tuple[Area, ...]
@@ -61,15 +61,15 @@ class _Block:
 
     @property
     def height(self) -> float:
-        """The height with the gap to the next one."""
+        """The height of the block, including the gap to the next block."""
         return self.bottom - self.top + ROW_GAP
 
 
 def in_columns(forest: Forest, flat: Layout) -> Layout:
     """Return the layout ``flat`` in the fewest columns that make it no taller than wide.
 
-    It is unchanged if there are several roots, nothing branches, or a group begins above the
-    branches.
+    ``flat`` is returned unchanged if it has several roots or no branches, or if a group begins
+    above the branching frame.
     """
     stem = _stem(forest)
     children = forest.children[stem[-1]] if stem else []
@@ -85,9 +85,9 @@ def in_columns(forest: Forest, flat: Layout) -> Layout:
 
 
 def _stem(forest: Forest) -> list[str]:
-    """Return the frames from the only root to the first with several children.
+    """Return the frames from the only root to the first frame with several children.
 
-    Empty where there are several roots.
+    Empty if there are several roots.
     """
     roots = [frame for frame in forest.order if frame not in forest.up]
     if len(roots) != 1 or forest.extra:
@@ -117,7 +117,7 @@ def _block(forest: Forest, flat: Layout, child: str) -> _Block:
 
 
 def _split(blocks: Sequence[_Block], count: int) -> list[list[_Block]]:
-    """Return the blocks in order, in at most this many columns, the tallest as low as possible."""
+    """Return the blocks in order, in at most ``count`` columns of minimal height."""
     low, high = max(block.height for block in blocks), sum(block.height for block in blocks)
     while high - low > 1:
         middle = (low + high) / 2

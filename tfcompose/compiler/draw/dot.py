@@ -1,4 +1,4 @@
-"""A graph in DOT, the language of Graphviz."""
+"""A graph in DOT, Graphviz's language."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LINES = {"static": "solid", "joint": "dashed", "dynamic": "dashed", "alternativ
 def dot(graph: Graph, *, is_down: bool = False) -> str:
     """Return the graph in the DOT language.
 
-    Frames are nodes, groups are clusters, and owners have colours.
+    Frames become nodes, groups become clusters, and each owner has a colour.
     """
     return "".join(f"{line}\n" for line in _lines(graph, "TB" if is_down else "LR"))
 

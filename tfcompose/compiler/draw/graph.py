@@ -1,4 +1,4 @@
-"""Contents of a picture: frames, edges, groups and owners, declared or observed."""
+"""Content of a picture: frames, edges, groups and owners, declared or observed."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Arrow:
     detail: str = ""
     #: Text on the second line of the child's box.
     pose: str = ""
-    #: Whether the parent is a further one that the owner can switch to, as a tool changer does.
-    #: The layout ignores such edges.
+    #: Whether the owner can switch the child to this parent, as a tool changer does. The layout
+    #: ignores such edges.
     alternative: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Frames that belong together, such as those of a sensor."""
+    """Frames that belong together, such as the frames of a sensor."""
 
     label: str
     frames: tuple[str, ...]
@@ -38,21 +38,21 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """A TF tree, or a graph with several roots, second parents or cycles, drawn as it is."""
+    """A TF tree, or any other graph: it may have several roots, second parents or cycles."""
 
     title: str
-    #: In drawing order. Frames that only edges name may be missing.
+    #: Frames in drawing order. Frames that occur only in edges may be missing.
     frames: tuple[str, ...]
-    #: In drawing order.
+    #: Edges in drawing order.
     arrows: tuple[Arrow, ...]
     groups: tuple[Group, ...] = ()
-    #: In the order of their colours.
+    #: Owners in the order of their colours.
     owners: tuple[str, ...] = ()
-    #: The edges to frames that are not drawn.
+    #: Edges to frames that the picture leaves out.
     hidden: tuple[Arrow, ...] = ()
 
     def all_frames(self) -> list[str]:
-        """Return every frame once: ``frames``, then those that only edges and groups name."""
+        """Return every frame once: ``frames``, then frames that occur only in edges and groups."""
         ends = (end for arrow in self.arrows for end in (arrow.parent, arrow.child))
         return list(
             dict.fromkeys(
@@ -61,12 +61,15 @@ class Graph:
         )
 
     def all_owners(self) -> list[str]:
-        """Return every owner once: ``owners``, then those that only edges name."""
+        """Return every owner once: ``owners``, then owners that occur only in edges."""
         return list(dict.fromkeys((*self.owners, *(arrow.owner for arrow in self.arrows))))
 
 
 def collapse_groups(graph: Graph) -> Graph:
-    """Return the graph with each group reduced to its first frame and the frames above others."""
+    """Return the graph with each group reduced.
+
+    Of each group, only the first frame and frames with children outside the group remain.
+    """
     up = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
     inside = {frame: group for group in graph.groups for frame in group.frames}
     first = {
@@ -114,17 +117,17 @@ class Forest:
 
     #: Frames from top to bottom, parents before descendants.
     order: tuple[str, ...]
-    #: The arrow from each frame's parent, by frame.
+    #: The arrow from its parent to each frame, by frame.
     up: dict[str, Arrow]
-    #: By parent.
+    #: Children by parent.
     children: dict[str, list[str]]
     #: All arrows that are not in ``up``.
     extra: tuple[Arrow, ...]
-    #: The index of a frame's group, by frame.
+    #: The index of each frame's group, by frame.
     group: dict[str, int]
 
     def enters(self, frame: str) -> bool:
-        """Return whether the frame is the first of its group."""
+        """Return whether the frame is the first frame of its group."""
         group = self.group.get(frame)
         return group is not None and (
             frame not in self.up or self.group.get(self.up[frame].parent) != group
@@ -134,8 +137,8 @@ class Forest:
 def forest_of(graph: Graph) -> Forest:
     """Return the graph as trees.
 
-    A frame with several parents is below the first, and each cycle is broken once. Children in the
-    same group as their parent come first, so that groups stay together.
+    A frame with several parents is placed below its first parent. Each cycle is broken at one
+    edge. Children in their parent's group come first, so that groups stay together.
     """
     group = {frame: index for index, group in enumerate(graph.groups) for frame in group.frames}
     frames = graph.all_frames()
@@ -162,7 +165,7 @@ def forest_of(graph: Graph) -> Forest:
 def _walk(
     frames: Iterable[str], first: dict[str, Arrow], below: dict[str, list[str]]
 ) -> tuple[tuple[str, ...], dict[str, Arrow]]:
-    """Return the frames in the order of the picture, and the arrow from each one's parent.
+    """Return the frames in drawing order, and the arrow from its parent to each frame.
 
     Cycles come last.
     """

@@ -1,10 +1,11 @@
-"""The position of each frame.
+"""Positions of frames.
 
-To the right: a row for each leaf, and each parent in the middle of its children. Down: a row for
-each frame, below its parent and a little to its right, so that a long chain, such as an arm, fits
-a page. Separate subtrees share no rows, and a child begins to the right of its parent, or below
-it, so no two boxes overlap. The cost grows linearly with the number of frames. A group's rectangle
-surrounds its own frames and any descendants between them.
+Drawn to the right, each leaf has its own row, and each parent is level with the middle of its
+children. Drawn down, each frame has its own row, below its parent and a little to the right, so
+that a long chain such as an arm fits on a page. Separate subtrees share no rows. A child begins to
+the right of its parent, or below it. Therefore no two boxes overlap. The cost grows linearly with
+the number of frames. A group's rectangle surrounds the group's frames and any descendants between
+them.
 """
 
 from __future__ import annotations
@@ -30,16 +31,16 @@ NEAREST, FARTHEST, STEEPNESS = (
     28.0,
     100.0,
     0.08,
-)  # from a parent to its children: more for a wide fan
-INDENT = 28.0  # downwards, from a parent's left edge to its children's
+)  # from a parent to its children; larger if they spread far
+INDENT = 28.0  # drawn down: from a parent's left edge to its children's left edge
 PAD = 8.0  # between a text and its box, and between a group and its frames
 
 
 @dataclass(slots=True)
 class FrameBox:
-    """A frame's box: left edge, middle of its height, width and height.
+    """A frame's box: left edge, vertical middle, width and height.
 
-    In px from the top left corner.
+    In px from the picture's top left corner.
     """
 
     x: float
@@ -60,7 +61,7 @@ class FrameBox:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """The rectangle of a group, with a strip for the label on top."""
+    """The rectangle of a group, with a strip for the label at the top."""
 
     #: The first frame of the group.
     frame: str
@@ -72,19 +73,18 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Trunk:
-    """The line from a frame to its children in columns.
-
-    Its y above them, and by child the x of the line down to it.
-    """
+    """The line from a frame to its children in columns."""
 
     frame: str
+    #: The y of the horizontal line above the children.
     y: float
+    #: The x of the vertical line to each child, by child.
     lines: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """All positions, the groups' areas (outer first), the total size, and the direction."""
+    """All positions, the groups' areas (outer groups first), the total size, and the direction."""
 
     places: dict[str, FrameBox]
     areas: tuple[Area, ...]
@@ -95,7 +95,7 @@ class Layout:
 
 
 def layout(graph: Graph, forest: Forest, *, is_down: bool) -> Layout:
-    """Return the position of everything, from (0, 0), down or to the right."""
+    """Return all positions, drawn down or to the right, with the top left corner at (0, 0)."""
     places = {frame: _box(forest, frame) for frame in forest.order}
     bands, height = _rows(forest, places, is_down=is_down)
     (_indent if is_down else _columns)(forest, places)
@@ -119,9 +119,9 @@ def _box(forest: Forest, frame: str) -> FrameBox:
 def _rows(
     forest: Forest, places: dict[str, FrameBox], *, is_down: bool
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Give each frame its y; return each group's top and bottom, and the height.
+    """Set the y of each frame. Return each group's top and bottom, and the total height.
 
-    Groups are keyed by the frame where they begin.
+    Groups are keyed by their first frame.
     """
     bands: dict[str, tuple[float, float]] = {}
     row = max((box.height for box in places.values()), default=0.0)
@@ -184,9 +184,9 @@ def _areas(
     places: dict[str, FrameBox],
     bands: dict[str, tuple[float, float]],
 ) -> tuple[tuple[Area, ...], float]:
-    """Return the areas, outer ones first, and the total width.
+    """Return the groups' areas, outer groups first, and the total width.
 
-    ``bands`` holds the top and bottom of a frame where a group begins, with its descendants.
+    ``bands`` holds, for the first frame of each group, the top and bottom of its subtree.
     """
     order = forest.order
     reach = {frame: box.right for frame, box in places.items()}
@@ -202,25 +202,25 @@ def _areas(
             label = places[frame].x + width_of(
                 shorten_label(graph.groups[forest.group[frame]].label), LABEL_SIZE
             )
-            own = _own(forest, places, frame, below, label)
-            right, bottom = own or (max(reach[frame], label) + PAD, bands[frame][1])
+            area = _group_area(forest, places, frame, below, label)
+            right, bottom = area or (max(reach[frame], label) + PAD, bands[frame][1])
             reach[frame] = max(reach[frame], right)
             areas.append(Area(frame, places[frame].x - PAD, bands[frame][0], right, bottom))
     return tuple(reversed(areas)), max(reach.values(), default=0.0)
 
 
-def _own(
+def _group_area(
     forest: Forest, places: dict[str, FrameBox], begin: str, below: Sequence[str], label: float
 ) -> tuple[float, float] | None:
-    """Return the right and lower edge around a group's frames, None if others are in the way.
+    """Return the right and lower edge around a group's frames, None if another frame is between.
 
-    ``label`` is where the group's label ends.
+    ``label`` is the x where the group's label ends.
     """
     group = forest.group[begin]
-    own = [places[frame] for frame in below if forest.group.get(frame) == group]
-    right = max(label, *(box.right for box in own)) + PAD
-    bottom = max(box.bottom for box in own) + PAD
-    if len(own) < len(below):
+    areas = [places[frame] for frame in below if forest.group.get(frame) == group]
+    right = max(label, *(box.right for box in areas)) + PAD
+    bottom = max(box.bottom for box in areas) + PAD
+    if len(areas) < len(below):
         for frame in below:
             box = places[frame]
             near = box.x - PAD < right and box.bottom - box.height - PAD < bottom

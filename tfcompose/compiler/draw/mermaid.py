@@ -19,7 +19,7 @@ _ESCAPED = re.compile(r"[^\w ,.:/+()°·→-]")
 def mermaid(graph: Graph, *, is_down: bool = False) -> str:
     """Return the graph as a Mermaid flowchart.
 
-    Moving edges are dotted, groups are subgraphs, owners have colours.
+    Moving edges are dotted, groups are subgraphs, and each owner has a colour.
     """
     return "".join(f"{line}\n" for line in _lines(graph, "TD" if is_down else "LR"))
 
@@ -63,8 +63,8 @@ def _colours(graph: Graph, owners: dict[str, int]) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    """Return the text as Mermaid's quotes hold it.
+    """Return the text for a quoted Mermaid string.
 
-    What could be a sign of the language is an entity.
+    Characters with a meaning in Mermaid become entities.
     """
     return _ESCAPED.sub(lambda match: f"#{ord(match[0])};", visible(text))

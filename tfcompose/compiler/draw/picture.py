@@ -1,6 +1,6 @@
-"""A graph as a drawing: boxes, curves, texts and a legend, for any format.
+"""A graph as a drawing of boxes, curves, texts and a legend, independent of the file format.
 
-Lengths are in px from the top left corner, y down.
+Lengths are in px from the top left corner, with y down.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Point = tuple[float, float]
 
 MARGIN = 16.0
 CORNER = 5.0
-BASE = 4.2  # from the middle of a name down to its base line
+BASE = 4.2  # from the vertical middle of a name down to its baseline
 MIN_WIDTH = 440.0
 LEGEND_LINE = 22.0
 ITEM_GAP = 20.0
@@ -60,32 +60,32 @@ class Box:
 class Curve:
     """Connected cubic Bézier curves."""
 
-    #: Four for the first curve, three more for each further one.
+    #: Four points for the first curve, and three for each further curve.
     points: tuple[Point, ...]
     style: str
-    #: A description, for formats that can show one.
+    #: A description, for file formats that can show it.
     about: str = ""
 
     @property
     def straight(self) -> bool:
-        """Whether it is a horizontal line from left to right."""
+        """Whether the curve is a horizontal line."""
         return len({y for _, y in self.points}) == 1
 
 
 def _level(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
-    """Return the curve that leaves and arrives horizontally."""
+    """Return the curve that leaves ``start`` and arrives at ``end`` horizontally."""
     bend = (start[0] + end[0]) / 2
     return start, (bend, start[1]), (bend, end[1]), end
 
 
 def _falling(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
-    """Return the curve that leaves downwards and arrives horizontally."""
+    """Return the curve that leaves ``start`` downwards and arrives at ``end`` horizontally."""
     corner = (start[0], end[1])
     return start, corner, corner, end
 
 
 def _along(*corners: Point) -> tuple[Point, ...]:
-    """Return curves along horizontal and vertical lines, with rounded corners."""
+    """Return a path through the corners, with rounded corners and straight lines between them."""
     points = [corners[0]]
     for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
         into, out = _towards(corner, before), _towards(corner, after)
@@ -93,28 +93,32 @@ def _along(*corners: Point) -> tuple[Point, ...]:
     return (*points, corners[-1], corners[-1], corners[-1])
 
 
-def _towards(corner: Point, other: Point) -> Point:
-    """Return the point where a rounded corner begins, or ends."""
-    x, y = other[0] - corner[0], other[1] - corner[1]
+def _towards(corner: Point, target: Point) -> Point:
+    """Return the point towards ``target`` where the rounding of ``corner`` begins or ends."""
+    x, y = target[0] - corner[0], target[1] - corner[1]
     part = min(1.0, CORNER / max(abs(x), abs(y), CORNER))
     return corner[0] + part * x, corner[1] + part * y
 
 
 def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
-    """Return the curve that leaves and arrives from below, and sags more the farther it goes."""
+    """Return the curve that leaves and arrives from below; it sags more over a longer distance."""
     sag = 26.0 + 0.08 * (abs(end[0] - start[0]) + abs(end[1] - start[1]))
     return start, (start[0], start[1] + sag), (end[0], end[1] + sag), end
 
 
 @dataclass(slots=True)
 class TextLine:
-    """A line of text: start or middle of its baseline, and its maximum width."""
+    """A line of text."""
 
+    #: The start of the text, or its middle.
     x: float
+    #: The baseline.
     y: float
     text: str
     style: str
+    #: The maximum width.
     width: float
+    #: Whether ``x`` is the middle.
     middle: bool = False
 
 
@@ -123,7 +127,7 @@ Shape = Union[Box, Curve, TextLine]  # noqa: UP007 (evaluated when it is loaded,
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """Shapes from back to front, and the size of the page."""
+    """The size of the page, and its shapes from back to front."""
 
     title: str
     width: float
@@ -134,7 +138,7 @@ class Drawing:
 def draw(graph: Graph, direction: Direction = "auto") -> Drawing:
     """Return the drawing of the graph.
 
-    Groups at the back, then edges, then frames, and the legend on top.
+    Groups are at the back, then edges, then frames. The legend is above the tree.
     """
     forest = forest_of(graph)
     places = arrange(graph, forest, direction)
@@ -149,7 +153,7 @@ def draw(graph: Graph, direction: Direction = "auto") -> Drawing:
 
 @dataclass(frozen=True, slots=True)
 class _Pen:
-    """What is drawn of one graph, moved to where the tree begins."""
+    """Shapes of one graph, moved to where the tree begins."""
 
     graph: Graph
     forest: Forest
@@ -159,7 +163,7 @@ class _Pen:
     top: float
 
     def areas(self) -> list[Shape]:
-        """Return the groups, with their labels."""
+        """Return the rectangles of the groups, with their labels."""
         return [shape for area in self.layout.areas for shape in self._area(area)]
 
     def _area(self, area: Area) -> tuple[Shape, ...]:
@@ -173,9 +177,9 @@ class _Pen:
         )
 
     def extras(self) -> list[Curve]:
-        """Return the edges that are not of the trees.
+        """Return the curves of the edges that are not in ``Forest.up``.
 
-        Forward as all others, and back from below to below.
+        A curve to the right looks like other edges. A curve back leaves and arrives from below.
         """
         curves = []
         for arrow in self.forest.extra:
@@ -185,7 +189,7 @@ class _Pen:
         return curves
 
     def tree(self) -> list[Shape]:
-        """Return each frame with the edge from its parent."""
+        """Return each frame, with the edge from its parent."""
         shapes: list[Shape] = []
         for frame in self.forest.order:
             box, arrow = self.layout.places[frame], self.forest.up.get(frame)
@@ -292,7 +296,7 @@ def _facts(arrow: Arrow) -> list[str]:
 def _legend(
     graph: Graph, owners: dict[str, int], width: float, margin: float
 ) -> tuple[list[Shape], float, float]:
-    """Return the title and legend, the total width without margins, and the tree's y."""
+    """Return the title and legend, the total width without margins, and the y of the tree."""
     edges = Counter(
         arrow.owner for arrow in (*graph.arrows, *graph.hidden) if not arrow.alternative
     )
@@ -319,7 +323,7 @@ def _legend(
 
 @dataclass(frozen=True, slots=True)
 class _Item:
-    """What a kind of line, or else the number and colour of an owner, means."""
+    """Entry of the legend: the meaning of a kind of line, or of an owner's number and colour."""
 
     text: str
     kind: str = ""
@@ -344,9 +348,9 @@ def _line_items(graph: Graph) -> list[_Item]:
 def _wrap_items(
     items: list[_Item], margin: float, y: float, width: float
 ) -> tuple[list[Shape], float, float]:
-    """Return the items in lines that fit ``width``, the next line's y, and the width.
+    """Return the items in lines that fit ``width``, the y of the next line, and the used width.
 
-    It is larger if one item alone is wider.
+    The used width exceeds ``width`` if a single item is wider.
     """
     shapes: list[Shape] = []
     x = margin

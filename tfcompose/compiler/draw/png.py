@@ -1,6 +1,6 @@
-"""A drawing as PNG: its SVG rendered by resvg, in Lato from the package ``font_lato``.
+"""A drawing as PNG: resvg renders its SVG, with the font Lato from the package ``font_lato``.
 
-System fonts are used only for characters that Lato lacks.
+System fonts supply only the characters that Lato lacks.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from tfcompose.compiler.draw.svg import svg
 if TYPE_CHECKING:
     from tfcompose.compiler.draw.picture import Drawing
 
-PIXELS_PER_PX = 2.0  # for screens that have them, and for print
+PIXELS_PER_PX = 2.0  # for high-density screens and for print
 MOST_PIXELS = 50e6
-MOST_TO_A_SIDE = 32_000.0  # viewers count these in 15 bits
+MOST_TO_A_SIDE = 32_000.0  # viewers store a length in 15 bits
 
 
 def png(drawing: Drawing) -> bytes:
-    """Return the drawing as PNG at two pixels per px, fewer for a very large one."""
+    """Return the drawing as PNG at two pixels per px; a very large drawing gets fewer."""
     scale = min(
         PIXELS_PER_PX,
         (MOST_PIXELS / (drawing.width * drawing.height)) ** 0.5,

@@ -1,8 +1,8 @@
 """Colours, lines and fonts in one table, and widths of text.
 
-The owners' colours are those of Okabe and Ito, which people with any kind of colour blindness can
-tell apart. Each owner also has a number, for print without colour and for robots with more owners
-than colours.
+The owners' colours come from the palette by Okabe and Ito, which colour-blind people can tell
+apart. Each owner also has a number, for print without colour and for robots with more owners than
+colours.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ SANS = "Arial, Helvetica, 'Liberation Sans', sans-serif"
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """Colours as six hexadecimal digits, in light and dark mode; empty: none.
+    """Colours, each as six hexadecimal digits for light and dark mode, and lengths in px.
 
-    Lengths in px.
+    An empty colour means that nothing is drawn.
     """
 
     fill: tuple[str, str] = ("", "")
@@ -35,13 +35,13 @@ PAPER = ("ffffff", "14181d")
 INK = ("1b1f24", "e8ebee")
 SOFT = ("57606a", "a3adb8")
 
-#: Colours of the line, the box, and text on the line, each in light and dark mode.
+#: Colours of each owner: the line, the box, and text on the line, each for light and dark mode.
 _OWNERS = (
     (
         ("66707c", "8d98a5"),
         ("f1f3f5", "242a31"),
         ("ffffff", "14181d"),
-    ),  # grey: static, as most edges are
+    ),  # grey: the first owner, usually ``static``, which owns most edges
     (("0072b2", "4ba3da"), ("e3f0f8", "152a3a"), ("ffffff", "14181d")),  # blue
     (("d55e00", "ef8235"), ("fbeadd", "38220f"), ("ffffff", "14181d")),  # vermilion
     (("008a64", "2bb58c"), ("e0f3ed", "10302a"), ("ffffff", "14181d")),  # green
@@ -52,9 +52,9 @@ _OWNERS = (
 
 
 def colour_of(owner: int) -> int:
-    """Return the number of the owner's colour, from 0.
+    """Return the index of the owner's colour.
 
-    The first owner alone has grey. The others share the rest.
+    Only the first owner has grey. The other owners share the remaining colours.
     """
     return 1 + (owner - 1) % (len(_OWNERS) - 1) if owner else 0
 
@@ -69,7 +69,7 @@ def _of_owner(index: int) -> dict[str, Style]:
     }
 
 
-#: By name; a shape names one or two, the second for what is different.
+#: Styles by name. A shape names one or two styles; the second overrides the first.
 STYLES: dict[str, Style] = {
     "paper": Style(fill=PAPER),
     "group": Style(fill=("f7f8fa", "1b2027"), stroke=("c4cbd3", "434c57"), width=1.0),
@@ -87,8 +87,8 @@ STYLES: dict[str, Style] = {
 }
 
 
-#: Widths of Helvetica, which Arial, Liberation Sans and Nimbus Sans share, in thousandths of the
-#: font's size, from the space to the tilde (Adobe's metrics).
+#: Character widths of Helvetica from the space to the tilde, in thousandths of the font size
+#: (Adobe's metrics). Arial, Liberation Sans and Nimbus Sans have the same widths.
 _ASCII = (
     278,
     278,
@@ -195,9 +195,9 @@ _MAX_CHARACTERS = 72
 
 @lru_cache(maxsize=1 << 14)
 def width_of(text: str, size: float, *, bold: bool = False) -> float:
-    """Return the width of the text, in the unit of ``size``, to a tenth.
+    """Return the width of the text in the unit of ``size``, rounded to a tenth.
 
-    Characters beyond ASCII count as wide as they are high.
+    A character beyond ASCII counts as wide as ``size``.
     """
     thousandths = sum([_WIDTHS.get(character, _OTHER_WIDTH) for character in text])
     return math.ceil(thousandths * size * (_BOLD if bold else 1.0) / 100) / 10
@@ -206,7 +206,7 @@ def width_of(text: str, size: float, *, bold: bool = False) -> float:
 def shorten_label(text: str) -> str:
     """Return the text as drawn.
 
-    Invisible characters become escapes, and a long text keeps its beginning and end.
+    Invisible characters become escapes. A long text keeps its beginning and end.
     """
     text = visible(text)
     if len(text) <= _MAX_CHARACTERS:

@@ -1,4 +1,4 @@
-"""A drawing as SVG with its own style sheet, light and dark, and common fonts."""
+"""A drawing as SVG with a style sheet for light and dark mode, in common fonts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 
 
 def svg(drawing: Drawing) -> str:
-    """Return the drawing as SVG; the same drawing gives the same text.
+    """Return the drawing as SVG; the same drawing always gives the same text.
 
     Each edge is a path with a title, which browsers show as a tooltip.
     """
@@ -37,7 +37,7 @@ def svg(drawing: Drawing) -> str:
 
 
 def _sheet(drawing: Drawing) -> Iterator[str]:
-    """Yield the rules of the styles that the drawing uses, and of their colours in dark mode."""
+    """Yield the style rules that the drawing uses, and their dark-mode colours."""
     used = {"paper", *(name for shape in drawing.shapes for name in shape.style.split())}
     styles = {name: style for name, style in STYLES.items() if name in used}
     yield "path{fill:none}\n"
@@ -81,15 +81,15 @@ def _shape(shape: Shape) -> str:
 
 
 def _curve(curve: Curve) -> str:
-    start, *others = [f"{x:g} {y:g}" for x, y in curve.points]
-    way = f"M{start}H{curve.points[-1][0]:g}" if curve.straight else f"M{start}C{' '.join(others)}"
+    start, *rest = [f"{x:g} {y:g}" for x, y in curve.points]
+    way = f"M{start}H{curve.points[-1][0]:g}" if curve.straight else f"M{start}C{' '.join(rest)}"
     if not curve.about:
         return f'<path class="{curve.style}" d="{way}"/>\n'
     return f'<path class="{curve.style}" d="{way}"><title>{_text(curve.about)}</title></path>\n'
 
 
 def _line(text: TextLine) -> str:
-    """Return a text with its length, so that it fits its box in any font."""
+    """Return a text element with a fixed length, so that the text fits its box in any font."""
     where = f'class="{text.style}" x="{text.x:g}" y="{text.y:g}"'
     if text.middle:
         return f'<text {where} text-anchor="middle">{_text(text.text)}</text>\n'

@@ -1,6 +1,7 @@
-"""Files, as text, from a ``Robot`` without errors.
+"""Built files, as text, of a ``Robot`` without errors.
 
-plan.json, URDF, xacro, parameters and pictures. The same robot gives the same bytes.
+These are plan.json, URDF, xacro, parameter files and pictures. The same robot always gives the
+same bytes.
 """
 
 from tfcompose.compiler.emit.emit import descriptions_of, emit

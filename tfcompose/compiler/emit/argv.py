@@ -1,4 +1,4 @@
-"""Command lines of processes, with ROS arguments of nodes, and parameter files."""
+"""Command lines of processes, with the ROS arguments of their nodes, and parameter files."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tfcompose.model.plan.components import json_value
 from tfcompose.model.robot import AsInFile, value_of_word
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Callable, Collection, Iterator
 
     from tfcompose.model.robot import Process, Robot
 
 
-#: The file of parameters, which is named once.
+#: Placeholder for the parameter file. A command line contains it once.
 _PARAMS_FILE = "${params_file}"
 
 
 def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> tuple[str, ...]:
-    """Return the process's command.
+    """Return the command line of the process.
 
-    ``owns``: the process owns edges. ``has_params``: a parameter file is written for it.
+    ``owns``: whether the process owns edges. ``has_params``: whether it has a parameter file.
     """
     if process.kind in {"external", "component"}:
         return ()
@@ -35,8 +35,8 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
             for name, value in _own_params(process)
             for argument in ("-p", f"{name}:={json.dumps(value)}")
         ]
-        own = (PROGRAM, process.kind, "${plan}", process.name)
-        return (*own, "--ros-args", *arguments) if arguments else own
+        argv = (PROGRAM, process.kind, "${plan}", process.name)
+        return (*argv, "--ros-args", *arguments) if arguments else argv
     if process.launch is not None:
         return (f"${{launch:{process.launch}}}", *process.argv)
     if not process.is_node(owns=owns):
@@ -44,7 +44,7 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
     arguments = _ros_arguments(process, robot, has_params=has_params)
     if process.package is None:
         names = _names(process, robot)
-        if "--params-file" in arguments:  # which is keyed by the node's name
+        if "--params-file" in arguments:  # the parameter file is keyed by the node's name
             arguments = [*names, *arguments]
         elif process.namespace is not None or (robot.ros.namespace and (arguments or owns)):
             arguments = [*names[-2:], *arguments]
@@ -54,13 +54,13 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
 
 
 def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[str]:
-    """Return the ROS arguments but for names; a parameter file is named once."""
+    """Return the ROS arguments except names; the parameter file occurs once."""
     ros_args = [
         argument for old, new in process.remap.items() for argument in ("-r", f"{old}:={new}")
     ]
     if process.log_level is not None:
         ros_args += ["--log-level", process.log_level]
-    # A value behind -p counts as one for /**: of two for the same nodes the later one holds.
+    # ROS treats -p NAME:=VALUE as a section /**. If two sections match a node, the later wins.
     if has_params and not any(_PARAMS_FILE in text for text in process.texts):
         ros_args += ["--params-file", _PARAMS_FILE]
     if robot.ros.clock == "sim":
@@ -71,9 +71,9 @@ def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[
 
 
 def _own_params(process: Process) -> list[tuple[str, Any]]:
-    """Return the parameters of one of tfcompose's own processes.
+    """Return the parameters of a process that tfcompose provides.
 
-    A number is a double, as its parameter is.
+    Numbers become floats, because these processes declare doubles.
     """
     params: dict[str, Any] = dict(sorted(process.params.items()))
     for name, value in params.items():
@@ -83,7 +83,7 @@ def _own_params(process: Process) -> list[tuple[str, Any]]:
 
 
 def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the parameters, by their full names, with paths that only the launcher knows."""
+    """Yield parameters by full name whose values contain paths that only the launcher knows."""
     for key, value in params.items():
         if isinstance(value, dict):
             yield from _launch_time_params(value, f"{above}{key}.")
@@ -92,12 +92,10 @@ def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tup
 
 
 def _names(process: Process, robot: Robot) -> list[str]:
-    """Return what gives the node its name and namespace.
+    """Return the remappings that set the node's name and namespace.
 
-    Those that are listed as several have names of their own.
-
-    A name on the command line would rename every node of the process, also those that are not
-    listed.
+    If the process lists several nodes, only the namespace is set. A name on the command line would
+    rename every node of the process, including nodes that are not listed.
     """
     if len(process.nodes) > 1 or process.ros_nodes[0].path[2:3] == ("nodes",):
         return [
@@ -108,16 +106,17 @@ def _names(process: Process, robot: Robot) -> list[str]:
     return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]
 
 
-#: Characters that JSON allows in a text and YAML reads as the end of a line, or forbids.
+#: Characters that JSON allows in a string, and that YAML forbids or reads as a line end.
 _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
 def file_params(process: Process) -> dict[str, dict[str, Any]]:
     """Return the contents of the process's parameter file, by node.
 
-    Sections for other nodes in the files that it names come first, because every node of a process
-    reads the file. Its own parameters come last, so that they take precedence. Paths that only the
-    launcher knows are omitted: a section for one of its nodes would override the command line.
+    A process may name parameter files with sections for other nodes. These sections come first,
+    because every node of the process reads the file. The parameters of the process come last, so
+    that they take precedence. Paths that only the launcher knows are omitted, because a section
+    for one node would override the command line.
     """
     if process.kind != "run":
         return {}
@@ -128,12 +127,12 @@ def file_params(process: Process) -> dict[str, dict[str, Any]]:
         declared for declared in nodes if any(matches(declared, name) for name in names)
     ]:
         nodes[section] = _without(nodes[section], later)
-    known = {node: _known_params(params) for node, params in nodes.items()}
-    return {node: params for node, params in known.items() if params}
+    params = {node: _known_params(params) for node, params in nodes.items()}
+    return {node: params for node, params in params.items() if params}
 
 
 def _without(params: dict[str, Any], names: Collection[str], above: str = "") -> dict[str, Any]:
-    """Return parameters without those of these full names."""
+    """Return the parameters without those whose full name is in ``names``."""
     kept = {}
     for key, value in params.items():
         if isinstance(value, dict):
@@ -144,14 +143,14 @@ def _without(params: dict[str, Any], names: Collection[str], above: str = "") ->
 
 
 def component_params(process: Process, robot: Robot) -> dict[str, Any]:
-    """Return the parameters of a component by full name, as ROS values."""
+    """Return the parameters of a component as ROS values, by full name."""
     clock = {"use_sim_time": True} if robot.ros.clock == "sim" else {}
     params = process.ros_nodes[0].flat_texts
     return clock | {name: json_value(_read_as_ros(value)) for name, value in params.items()}
 
 
 def _read_as_ros(value: Any) -> Any:
-    """Return the value of a parameter; a word of a parameter file is what ROS reads there."""
+    """Return the value as ROS reads it, if it is a plain scalar from a parameter file."""
     if isinstance(value, list):
         items = [_read_as_ros(item) for item in value]
         return (
@@ -173,9 +172,9 @@ def _known_params(params: dict[str, Any]) -> dict[str, Any]:
 
 
 def params_file(nodes: dict[str, dict[str, Any]]) -> str:
-    """Return the file's text.
+    """Return the text of the parameter file.
 
-    Strings are quoted, so that ROS reads none as a number.
+    Strings are quoted, so that ROS does not read a string as a number.
     """
     lines = []
     for node, params in nodes.items():
@@ -183,8 +182,17 @@ def params_file(nodes: dict[str, dict[str, Any]]) -> str:
     return "\n".join([*lines, ""])
 
 
+#: The description in a parameter file.
+_DESCRIPTION = re.compile(r'^( +"robot_description": )("[^\n]*")$', re.MULTILINE)
+
+
+def edit_description(params: str, edit: Callable[[str], str]) -> str:
+    """Return a text of ``params_file`` with the robot description as ``edit`` returns it."""
+    return _DESCRIPTION.sub(lambda match: f"{match[1]}{_text(edit(json.loads(match[2])))}", params)
+
+
 def _mapping(values: dict[str, Any], indent: str) -> list[str]:
-    """Return the mapping as lines of YAML; lists and texts as JSON, which is YAML as well."""
+    """Return the mapping as lines of YAML. Lists and strings are JSON, which is valid YAML."""
     lines = []
     for key, value in values.items():
         if isinstance(value, dict) and value:
@@ -194,14 +202,14 @@ def _mapping(values: dict[str, Any], indent: str) -> list[str]:
     return lines
 
 
-#: A word that YAML reads as one plain word in any place.
+#: Text that YAML reads as one plain scalar in any position.
 _PLAIN = re.compile(r"[A-Za-z0-9_.+-]+")
 
 
 def _text(value: Any) -> str:
-    """Return the value as JSON that is YAML as well.
+    """Return the value as JSON, which is valid YAML.
 
-    A word of a parameter file as it was there.
+    A plain scalar from a parameter file keeps its original text.
     """
     if isinstance(value, AsInFile) and _PLAIN.fullmatch(value):
         return str(value)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
-    """Return the robot's files; the same robot gives the same bytes.
+    """Return the robot's files; the same robot always gives the same bytes.
 
-    The robot must have no errors. ``target`` says where the files are written and how they address
-    meshes.
+    The robot must have no errors. ``target`` holds the folder to write to, and the form of mesh
+    addresses.
     """
     live = robot.with_final_names()
     descriptions = {}
@@ -47,14 +47,17 @@ def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
 
 
 def descriptions_of(robot: Robot) -> list[tuple[str, Robot]]:
-    """Return the robot, and by name each part that is a robot: each has a description."""
+    """Return the robot, and each part that is a separate robot, by the part's name.
+
+    Each of them has its own robot description.
+    """
     return [("", robot), *((part.name, part.robot) for part in robot.parts)]
 
 
 def _params(process: Process, nodes: dict[str, dict[str, Any]], stock: dict[str, str]) -> File:
-    """Return the process's parameters.
+    """Return the parameter file of the process.
 
-    A stock publisher's with the description that is meant for it.
+    A stock publisher's file includes the robot description that this publisher needs.
     """
     if process.describes:
         nodes = {
@@ -65,7 +68,7 @@ def _params(process: Process, nodes: dict[str, dict[str, Any]], stock: dict[str,
 
 
 def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, ...]:
-    """Return the descriptions of the robot, or of a part with its own, in its folder."""
+    """Return the descriptions of the robot, or of a separate part in the part's folder."""
     target = replace(target, folder=posixpath.join(target.folder, folder))
     full, stock = urdf(robot, target)
     return (

@@ -1,4 +1,4 @@
-"""The plan: the start of each process, and the edges it owns."""
+"""The plan: how to start each process, and the edges that each process owns."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from tfcompose.model.fields import narrow
 from tfcompose.model.files import AS_IN_SOURCE, Target
 from tfcompose.model.plan import DESCRIPTION, Driven, Plan, PlanJoint, SourceLine
 from tfcompose.model.robot import JOINTS, STATIC
+from tfcompose.spec.language.overlay import SETTING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,12 +27,12 @@ _FILE = re.compile(r"\$\{file:([^{}]*)\}")
 
 _PUBLISHERS = frozenset({"static", "joints"})
 
-#: The order of processes: who has fixed edges and descriptions first, who watches last.
+#: Start order by kind: publishers of fixed edges and descriptions first, the guard last.
 _ORDER = {"static": 0, "joints": 1, "guard": 3}
 
 
 def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
-    """Return the plan of a robot without errors; ``target`` says where it will be written."""
+    """Return the plan of a robot without errors; ``target`` holds the folder to write to."""
     nodes = {process.name: process.node for process in robot.processes}
     needed = _needed_processes(robot)
     names = frozenset(process.name for process in needed)
@@ -59,11 +60,15 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
         spec_digest=_digest(robot),
         file=_relative(robot.file, robot.file),
         profiles=robot.profiles,
+        overlays=tuple(_overlay(overlay, robot.file) for overlay in robot.overlays),
         base=robot.base,
         ros=robot.ros,
         edges=edges,
         processes=tuple(
-            _on(main, _at(target, _process(process, robot, owned.get(process.name, []), names)))
+            _on(
+                main,
+                _relocate(target, _process(process, robot, owned.get(process.name, []), names)),
+            )
             for process in needed
         ),
         guard=robot.guard,
@@ -82,9 +87,8 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
 def _needed_processes(robot: Robot) -> list[Process]:
     """Return the processes that have something to do.
 
-    ``joints`` where joints move, else ``static`` at least.
-
-    That holds for the robot, and for each part that is a separate robot.
+    The robot, and each part that is a separate robot, gets ``joints`` if a joint moves, otherwise
+    at least ``static``.
     """
     owners = {edge.owner for edge in robot.edges}
     idle = {
@@ -92,9 +96,11 @@ def _needed_processes(robot: Robot) -> list[Process]:
         for process in robot.processes
         if process.kind in _PUBLISHERS and process.name not in owners
     }
-    own = {process.name for process in robot.processes if process.kind == "joints"} - idle
+    joint_publishers = {
+        process.name for process in robot.processes if process.kind == "joints"
+    } - idle
     for name in {_below(process.part, STATIC) for process in robot.processes}:
-        if _below(name.removesuffix(STATIC).rstrip("/"), JOINTS) not in own:
+        if _below(name.removesuffix(STATIC).rstrip("/"), JOINTS) not in joint_publishers:
             idle.discard(name)
     return sorted(
         (p for p in robot.processes if p.name not in idle),
@@ -107,16 +113,19 @@ def _below(part: str, name: str) -> str:
 
 
 def _digest(robot: Robot) -> str:
-    """Return the digest of what was written.
+    """Return the digest of the robot's source data.
 
-    It changes when a key or value does, and not with layout or comments.
+    The digest changes with keys and values, but not with layout or comments.
     """
     text = json.dumps(robot.source_data, sort_keys=True, ensure_ascii=False)
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 
 def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
-    """Return the edge; its joint without the ``prefix`` that joint states do not have."""
+    """Return the edge as a plan's edge.
+
+    Its joint loses ``prefix``, because joint states do not have the prefix.
+    """
     moving = edge.joint
     joint = None
     if moving:
@@ -126,16 +135,25 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
         )
         joint = narrow(PlanJoint, moving, name=name, mimic=mimic)
     return edge.to_plan(
-        node=node, pose=clean(edge.pose), source=SourceLine(file, edge.span.line), joint=joint
+        node=node,
+        pose=clean(edge.pose),
+        source=SourceLine(file, edge.span.line),
+        joint=joint,
+        mounts=(edge.sensor or "") if edge.declared else "",
     )
 
 
 def _relative(file: str, to: str) -> str:
-    """Return where ``file`` is, seen from the robot's file.
+    """Return the path of ``file`` relative to the folder of the robot file ``to``.
 
-    The same wherever the robot's folder is.
+    The result does not depend on the location of that folder.
     """
     return posixpath.relpath(file, posixpath.dirname(to) or ".")
+
+
+def _overlay(name: str, to: str) -> str:
+    """Return a ``--set`` unchanged, or an overlay's path relative to the robot file."""
+    return name if name.startswith(SETTING) else _relative(name, to)
 
 
 def _process(
@@ -163,8 +181,8 @@ def _process(
     )
 
 
-def _at(target: Target, process: PlanProcess) -> PlanProcess:
-    """Return the process with each file's place seen from the plan's folder."""
+def _relocate(target: Target, process: PlanProcess) -> PlanProcess:
+    """Return the process with file paths relative to the plan's folder."""
 
     def resolve_text(text: str) -> str:
         return _FILE.sub(lambda match: f"${{build_dir}}/{target.from_folder(match[1])}", text)
@@ -190,9 +208,9 @@ def _at(target: Target, process: PlanProcess) -> PlanProcess:
 
 
 def _on(main: str | None, process: PlanProcess) -> PlanProcess:
-    """Return the process on its host: what names none runs where ``static`` does.
+    """Return the process with its host: by default the host of ``static``.
 
-    The guard runs everywhere.
+    The guard runs on every host.
     """
     if process.host or process.kind in ("external", "guard"):
         return process
@@ -205,17 +223,17 @@ def driven_sensors(process: Process, robot: Robot) -> tuple[Driven, ...]:
 
 
 def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
-    """Return, by node, the written parameters that decide which edges it publishes."""
+    """Return, by node, the parameters in the file that decide which edges the node publishes."""
     keys = {key for sensor in _sensors(process, robot) for key in _switch(sensor)}
-    found = {}
+    values = {}
     for node in process.ros_nodes if process.kind in {"run", "external", "component"} else ():
-        wanted = keys | {
+        names = keys | {
             key for claim in robot.claims if claim.node == node.name for key in claim.off
         }
-        switches = {key: value for key, value in node.params.items() if key in wanted}
+        switches = {key: value for key, value in node.params.items() if key in names}
         if switches:
-            found[node.name] = switches
-    return found
+            values[node.name] = switches
+    return values
 
 
 def _sensors(process: Process, robot: Robot) -> Iterator[MountedSensor]:
@@ -225,7 +243,7 @@ def _sensors(process: Process, robot: Robot) -> Iterator[MountedSensor]:
 
 
 def _switch(sensor: MountedSensor) -> dict[str, Any]:
-    """Return what keeps the driver from publishing anything, whether or not it is kept from it."""
+    """Return all parameters that stop the driver from publishing TF, even if they are not set."""
     inside = sensor.switch if sensor.driver_frames else None
     return _claim_of(sensor) | (inside or {})
 

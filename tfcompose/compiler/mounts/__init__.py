@@ -1,1 +1,1 @@
-"""Mounts: frames' poses at joint positions, and edits of the file for a new pose."""
+"""Mounts: poses of frames at joint positions, and edits that give a mount a new pose."""

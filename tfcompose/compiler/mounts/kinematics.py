@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.geometry import Pose, quat_from_axis_angle
+from tfcompose.foundation.geometry import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def joint_positions(robot: Robot, positions: Mapping[str, float]) -> dict[str, float]:
-    """Return the position of each joint, in rad or m, from the ``positions`` of some.
+    """Return the position of each joint, in rad or m, from the given ``positions``.
 
-    A joint that mimics another follows it; one without a position is at 0.
+    A joint that mimics another joint follows it. Any other joint without a position is at 0.
     """
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
 
@@ -31,31 +31,24 @@ def joint_positions(robot: Robot, positions: Mapping[str, float]) -> dict[str, f
 
 
 def poses_in_roots(robot: Robot, positions: Mapping[str, float]) -> dict[str, Pose]:
-    """Return the pose of each frame in the root of its tree.
+    """Return the pose of each frame in the root frame of its tree.
 
-    ``positions`` are as for ``joint_positions``.
+    ``positions`` maps joints to positions in rad or m, as in ``joint_positions``.
     """
-    above = {edge.child: edge for edge in reversed(robot.edges)}  # of several parents the first
+    above = {edge.child: edge for edge in reversed(robot.edges)}  # the first parent wins
     joints = joint_positions(robot, positions)
     poses: dict[str, Pose] = {}
     for frame in robot.frames:
         chain: list[str] = []
-        at = frame
-        while at in above and at not in poses and at not in chain:
-            chain.append(at)
-            at = above[at].parent
-        pose = poses.setdefault(at, Pose())
+        ancestor = frame
+        while ancestor in above and ancestor not in poses and ancestor not in chain:
+            chain.append(ancestor)
+            ancestor = above[ancestor].parent
+        pose = poses.setdefault(ancestor, Pose())
         for name in reversed(chain):
             edge = above[name]
             motion = Pose()
             if edge.joint is not None:
-                value = joints[edge.joint.name]
-                x, y, z = edge.joint.axis
-                slides = edge.joint.type == "prismatic"
-                motion = (
-                    Pose((x * value, y * value, z * value))
-                    if slides
-                    else Pose(quat_xyzw=quat_from_axis_angle((x, y, z), value))
-                )
+                motion = edge.joint.motion(joints[edge.joint.name])
             pose = poses[name] = pose @ edge.pose @ motion
     return poses

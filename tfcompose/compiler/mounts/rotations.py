@@ -1,8 +1,8 @@
-"""A rotation in the form that a file uses, changed as little as possible.
+"""New numbers for a rotation in the form that the file uses, with as few changes as possible.
 
-Each form is numbers by their path below the key: ``(0,)`` of ``rpy``, ``("axis", 0)``,
-``("down",)`` of ``look``. Functions return the numbers of the new rotation; of equivalent ones,
-those nearest to the old numbers.
+Each form is a mapping from paths below its key to numbers: ``(0,)`` for ``rpy``, ``("axis", 0)``
+for ``axis_angle``, ``("down",)`` for ``look``. If several sets of numbers describe the new
+rotation, functions return the set nearest to the old numbers.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 Numbers = dict[tuple[str | int, ...], float]
 """Numbers in SI by their path below a key."""
 
-#: What two texts of one rotation differ by, in radians.
+#: Two texts of the same rotation differ by less than this, in radians.
 _SAME_RAD = 1e-9
-#: So near to ±π/2 roll and yaw turn about one axis.
+#: If the pitch is this close to ±π/2, in radians, roll and yaw rotate about the same axis.
 _UPRIGHT = 1e-7
-#: How far an axis may be from the old one for the angle alone to change.
+#: Largest difference to the old axis at which only the angle changes.
 _SAME_AXIS = 1e-9
 
 
 def rpy_near(rotation: Quaternion, old: Vector, tolerance: float) -> Vector:
-    """Return roll, pitch and yaw of a rotation.
+    """Return roll, pitch and yaw of a rotation, in radians.
 
-    Of equivalent angles, those with the fewest numbers that differ from the old ones.
+    Among equivalent angles, return the set with the fewest changes from ``old``.
     """
 
     def changes(rpy: Vector) -> tuple[int, float]:
@@ -51,18 +51,20 @@ def rpy_near(rotation: Quaternion, old: Vector, tolerance: float) -> Vector:
 
 
 def _all_rpy(rotation: Quaternion, old: Vector) -> Iterator[Vector]:
-    """Yield the angles of the rotation, each nearest to the old one."""
+    """Yield all equivalent angles of the rotation, each as near as possible to the old angle."""
     exact = rpy_from_quat(rotation)
-    found = [exact, clean_rpy(rotation)]
+    candidates = [exact, clean_rpy(rotation)]
     roll, pitch, yaw = exact
     if math.pi / 2 - abs(pitch) < _UPRIGHT:
-        sign = math.copysign(1.0, pitch)  # only yaw ∓ roll counts
-        found += [
+        sign = math.copysign(1.0, pitch)  # only yaw ∓ roll is determined
+        candidates += [
             (old[0], pitch, yaw + sign * (old[0] - roll)),
             (roll + sign * (old[2] - yaw), pitch, old[2]),
         ]
-    found += [(roll + math.pi, math.pi - pitch, yaw + math.pi) for roll, pitch, yaw in found]
-    for solution in found:
+    candidates += [
+        (roll + math.pi, math.pi - pitch, yaw + math.pi) for roll, pitch, yaw in candidates
+    ]
+    for solution in candidates:
         near = tuple(
             new + math.tau * round((was - new) / math.tau)
             for new, was in zip(solution, old, strict=True)
@@ -74,13 +76,13 @@ def _all_rpy(rotation: Quaternion, old: Vector) -> Iterator[Vector]:
 
 
 def rpy_numbers(rotation: Quaternion, old: Numbers, tolerance: float) -> Numbers:
-    """Return the numbers of ``rpy``."""
+    """Return the numbers of ``rpy``, in radians."""
     rpy = rpy_near(rotation, (old[0,], old[1,], old[2,]), tolerance)
     return {(index,): angle for index, angle in enumerate(rpy)}
 
 
 def quat_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) -> Numbers:
-    """Return the numbers of ``quat_xyzw``, with the sign nearer to the old one."""
+    """Return the numbers of ``quat_xyzw``, with the sign that is nearer to the old numbers."""
     sign = math.copysign(1.0, sum(part * old[index,] for index, part in enumerate(rotation)))
     return {(index,): sign * part for index, part in enumerate(rotation)}
 
@@ -94,7 +96,7 @@ def matrix_numbers(rotation: Quaternion, _old: Numbers, _tolerance: float) -> Nu
 
 
 def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) -> Numbers:
-    """Return the numbers of ``axis_angle``; if the axis is the same, only the angle changes."""
+    """Return the numbers of ``axis_angle``. If the axis is the same, only the angle changes."""
     old_axis = (old["axis", 0], old["axis", 1], old["axis", 2])
     length = norm(old_axis)
     x, y, z, w = normalise(rotation)
@@ -105,8 +107,8 @@ def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) ->
     )
     along = sum(a * b / length for a, b in zip(axis, old_axis, strict=True))
     sign = math.copysign(1.0, along)
-    aside = math.dist([sign * part for part in axis], [part / length for part in old_axis])
-    if half < _SAME_AXIS or aside * half < _SAME_AXIS:
+    distance = math.dist([sign * part for part in axis], [part / length for part in old_axis])
+    if half < _SAME_AXIS or distance * half < _SAME_AXIS:
         angle *= sign
         axis = old_axis
     was = old["angle",]
@@ -117,7 +119,7 @@ def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) ->
 def direction_numbers(rotation: Quaternion, old: Numbers, tolerance: float) -> Numbers:
     """Return the numbers of ``look`` with angles.
 
-    Existing keys are used, and others added only if needed.
+    Existing keys are changed. Other keys are added only if needed.
     """
     up, left = ("up",) in old, ("right",) not in old
     pitch_key, yaw_key = "up" if up else "down", "left" if left else "right"

@@ -1,7 +1,7 @@
-"""Rays from the frame of a sensor's stream, and the robot's bodies that they hit.
+"""Rays from the frame of a sensor's stream, and the robot's bodies that these rays hit.
 
-Pure functions of a ``Robot``. Boxes, cylinders, spheres and capsules need no library; meshes need
-trimesh.
+All functions are pure functions of a ``Robot``. Boxes, cylinders, spheres and capsules need no
+library; meshes need trimesh.
 """
 
 from tfcompose.compiler.rays.bodies import PosedShape, Surroundings, sphere_around

@@ -1,4 +1,4 @@
-"""The bodies around a sensor, in the frame of one of its streams."""
+"""The bodies around a sensor, in the frame of one of the sensor's streams."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ Neighbours = dict[str, list[tuple[str, Pose]]]
 
 @dataclass(frozen=True, slots=True)
 class PosedShape:
-    """A shape of a link."""
+    """A shape of a link, with its pose in a stream's frame or a group's first frame."""
 
     link: str
     shape: Shape
-    #: The shape's pose in the frame from which it is seen.
+    #: The shape's pose in that frame.
     pose: Pose
 
 
 @dataclass(frozen=True)
 class _Body(PosedShape):
-    """A shape in the first frame of its group, with the sphere around it."""
+    """A shape in the first frame of its group, with its bounding sphere."""
 
     @cached_property
     def sphere(self) -> tuple[float, float, float, float]:
-        """The centre, and the radius: endless around a mesh that cannot be read."""
+        """Centre (x, y, z) and radius in metres; infinite radius for an unreadable mesh."""
         centre, radius = sphere_around(self.shape) or ((0.0, 0.0, 0.0), math.inf)
         return *(self.pose @ Pose(centre)).xyz, radius
 
 
 class _Group:
-    """Frames that are fixed to each other, and the bodies on them.
+    """Frames that are fixed to each other, and the bodies on these frames.
 
-    ``poses`` are in the first of them.
+    ``poses`` are in the first frame of the group.
     """
 
     def __init__(self, robot: Robot, poses: dict[str, Pose]) -> None:
@@ -52,7 +52,10 @@ class _Group:
 
     @cached_property
     def bodies(self) -> list[_Body]:
-        """The shapes of the group's links, for collision, else those seen."""
+        """The collision shapes of the group's links.
+
+        For a link without these, its visual shapes.
+        """
         links = self._robot.links
         return [
             _Body(name, shape, pose @ shape.pose)
@@ -65,8 +68,9 @@ class _Group:
 class Surroundings:
     """Frames and bodies that do not move relative to a frame of the robot.
 
-    ``only_static`` follows static edges only. Otherwise a sensor's inner edges count too, whoever
-    publishes them, and, downwards, continuous joints at zero: a wheel turns on the spot.
+    With ``only_static`` only static edges count as fixed. Otherwise inner edges of a sensor count
+    too, even if a driver publishes them. So do bodies below a continuous joint, at position zero,
+    because a wheel turns on the spot.
     """
 
     def __init__(self, robot: Robot, *, only_static: bool = False) -> None:
@@ -97,15 +101,15 @@ class Surroundings:
         return self._groups[frame]
 
     def poses(self, frame: str) -> dict[str, Pose]:
-        """Return the pose in ``frame`` of each frame fixed relative to it."""
+        """Return the pose in ``frame`` of each frame that is fixed relative to ``frame``."""
         group = self._group(frame)
         to_frame = group.poses[frame].inverse()
         return {name: to_frame @ pose for name, pose in group.poses.items()}
 
-    def pose(self, frame: str, other: str) -> Pose | None:
-        """Return the pose of ``other`` in ``frame``, None if it moves relative to it."""
+    def pose(self, frame: str, target: str) -> Pose | None:
+        """Return the pose of ``target`` in ``frame``, None if one moves relative to the other."""
         poses = self._group(frame).poses
-        return poses[frame].inverse() @ poses[other] if other in poses else None
+        return poses[frame].inverse() @ poses[target] if target in poses else None
 
     def bodies(
         self,
@@ -115,21 +119,22 @@ class Surroundings:
         reach: float,
         without: Collection[str] = (),
     ) -> Iterator[PosedShape]:
-        """Yield, in ``frame``, the shapes that rays from there may meet within ``reach`` metres.
+        """Yield, in ``frame``, the shapes that rays from its origin may hit within ``reach`` m.
 
-        ``into`` are the rays' directions. Shapes of the sensor itself and of links ``without`` are
-        left out. A link whose origin is the sensor's is its housing.
+        ``into`` holds the directions of the rays. Shapes of the sensor and shapes of the links
+        ``without`` are left out. A link counts as part of the sensor if its origin is the sensor's
+        origin.
         """
-        own = {sensor.mount, *sensor.frames, *without}
+        excluded = {sensor.mount, *sensor.frames, *without}
         above = self._above.get(sensor.mount)
         if above and above.pose == Pose():
-            own.add(above.parent)
+            excluded.add(above.parent)
         group = self._group(frame)
-        at = group.poses[frame]
-        (from_x, from_y, from_z), to_frame = at.xyz, at.inverse()
-        cone = bundle_of(into).rotate(at.quat_xyzw)
+        pose = group.poses[frame]
+        (from_x, from_y, from_z), to_frame = pose.xyz, pose.inverse()
+        cone = bundle_of(into).rotate(pose.quat_xyzw)
         for body in group.bodies:
-            if body.link in own:
+            if body.link in excluded:
                 continue
             x, y, z, radius = body.sphere
             x, y, z = x - from_x, y - from_y, z - from_z
@@ -138,27 +143,27 @@ class Surroundings:
 
 
 def _reach_frames(neighbours: Neighbours, poses: dict[str, Pose]) -> dict[str, Pose]:
-    """Return the poses, and those of all frames that a way leads to."""
+    """Return ``poses`` plus the poses of all frames that can be reached from them."""
     poses, waiting = dict(poses), list(poses)
     while waiting:
-        here = waiting.pop()
-        for there, pose in neighbours.get(here, ()):
-            if there not in poses:
-                poses[there] = poses[here] @ pose
-                waiting.append(there)
+        frame = waiting.pop()
+        for neighbour, pose in neighbours.get(frame, ()):
+            if neighbour not in poses:
+                poses[neighbour] = poses[frame] @ pose
+                waiting.append(neighbour)
     return poses
 
 
 def sphere_around(shape: Shape) -> tuple[Vector, float] | None:
-    """Return the centre, in the shape's frame, and radius of its bounding sphere, in metres.
+    """Return the centre and radius of the shape's bounding sphere, in its frame, in metres.
 
-    None: a mesh that cannot be read, because trimesh is not installed or the file is no mesh.
+    None for a mesh that cannot be read, because trimesh is missing or the file is not a mesh.
     """
     if shape.kind != "mesh":
         return (0.0, 0.0, 0.0), shape.radius
     x, y, z = shape.size
     try:
-        # Numpy and trimesh: 0.3 s that most robots need not wait for.
+        # Importing numpy and trimesh takes 0.3 s, and most robots do not need them.
         from tfcompose.compiler.rays import meshes  # noqa: PLC0415
 
         return meshes.sphere_around(shape.mesh.path if shape.mesh else "", (x, y, z))

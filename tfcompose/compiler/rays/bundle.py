@@ -1,4 +1,4 @@
-"""Rays in bundles, each with the cone around it, to test few rays against each body."""
+"""Rays in bundles with bounding cones, so that each body is tested against few rays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.geometry import Quaternion, Vector
 
-#: A bundle of more rays is halved.
+#: A bundle with more rays is split in two.
 _FEW = 8
 _ROUNDING_M = 1e-9
 _NO_CONE = ((0.0, 0.0, 0.0), 0.0, 0.0)
@@ -22,9 +22,9 @@ _NO_CONE = ((0.0, 0.0, 0.0), 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Rays from the origin and the cone around them.
+    """Rays from the origin, and a cone around the rays.
 
-    Rays that spread over half a turn or more have no cone: axis, cosine and sine are 0.
+    Rays that spread over half a turn or more have no cone. Axis, cosine and sine are then 0.
     """
 
     #: The cone's axis, a unit vector.
@@ -33,20 +33,23 @@ class Bundle:
     cosine: float
     #: Sine of half the cone's opening angle.
     sine: float
-    #: Numbers and directions of the rays; empty if ``parts`` hold them.
+    #: Numbers and directions of the rays; empty if ``parts`` holds the rays.
     rays: tuple[tuple[int, Vector], ...] = ()
     parts: tuple[Bundle, ...] = ()
 
     def rotate(self, quat_xyzw: Quaternion) -> Bundle:
-        """Return the cone in another frame, given the orientation there of the rays' frame."""
+        """Return the cone in another frame.
+
+        ``quat_xyzw`` is the rays' orientation in that frame.
+        """
         return replace(self, axis=rotate(quat_xyzw, self.axis), rays=(), parts=())
 
     def may_meet(self, x: float, y: float, z: float, radius: float) -> bool:
-        """Return whether the cone meets the sphere around the point; in metres."""
+        """Return whether the cone meets the sphere around the point; all values in metres."""
         ax, ay, az = self.axis
         along = ax * x + ay * y + az * z
-        aside = math.sqrt(max(0.0, x * x + y * y + z * z - along * along))
-        return aside * self.cosine - along * self.sine <= radius + _ROUNDING_M
+        across = math.sqrt(max(0.0, x * x + y * y + z * z - along * along))
+        return across * self.cosine - along * self.sine <= radius + _ROUNDING_M
 
     def rays_near(
         self, x: float, y: float, z: float, radius: float
@@ -62,7 +65,7 @@ class Bundle:
 
 @lru_cache(maxsize=32)
 def bundle_of(into: tuple[Vector, ...]) -> Bundle:
-    """Return the bundle of the rays in these directions, which are unit vectors."""
+    """Return the bundle of rays in the directions ``into``, which are unit vectors."""
     return _bundle(list(enumerate(into)))
 
 

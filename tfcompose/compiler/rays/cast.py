@@ -1,4 +1,4 @@
-"""Rays from a stream into the bodies around it."""
+"""Rays from a stream's frame to the bodies around it."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Pose, Vector
     from tfcompose.model.robot import MountedSensor, Optics
 
-#: Beyond this nothing of a robot is.
+#: Maximum distance of a body from a sensor, in metres.
 _FAR_M = 1e3
 
 
 @dataclass(frozen=True, slots=True)
 class Ray:
-    """A ray in the stream's frame: unit vector, metres to the first body, and its link.
+    """A ray in the stream's frame: unit vector, distance to the first body, and the body's link.
 
-    Infinite distance if nothing blocks it.
+    The distance is in metres, and infinite if no body blocks the ray.
     """
 
     direction: Vector
@@ -39,23 +39,23 @@ class Ray:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The hits of one stream's rays, cast from the origin of its frame."""
+    """The hits of one stream's rays, which start at the origin of the stream's frame."""
 
     sensor: str
     optics: Optics
     #: Unit vectors in the stream's frame.
     directions: tuple[Vector, ...]
-    #: Distance to the first body in metres and that body's link, by the ray's number.
+    #: Distance to the first body in metres, and the link of the body, by the ray's number.
     hits: Mapping[int, tuple[float, str]]
-    #: Links that the origin is in or on, with the depth in metres. Their bodies block no ray,
+    #: Links whose bodies contain the origin, with the depth in metres. These bodies block no ray,
     #: because a flush-mounted sensor looks away from its mount.
     inside: Mapping[str, float]
-    #: Links with a mesh that cannot be read: trimesh is not installed, or the file is no mesh.
+    #: Links with an unreadable mesh: trimesh is not installed, or the file is not a mesh.
     left_out: tuple[str, ...] = ()
 
     @property
     def rays(self) -> tuple[Ray, ...]:
-        """Every ray, in the order of the directions."""
+        """All rays, in the order of ``directions``."""
         return tuple(
             Ray(direction, *self.hits.get(index, (math.inf, None)))
             for index, direction in enumerate(self.directions)
@@ -63,20 +63,20 @@ class View:
 
     @property
     def blocked(self) -> float:
-        """The fraction of the rays that a body blocks, from 0 to 1."""
+        """Fraction of the rays that a body blocks, from 0 to 1."""
         return len(self.hits) / len(self.directions) if self.directions else 0.0
 
     @property
     def blocking(self) -> tuple[str, ...]:
-        """The links that block rays, in descending order of blocked rays."""
+        """Links that block rays, in descending order of blocked rays."""
         counts = Counter(link for _, link in self.hits.values())
         return tuple(sorted(counts, key=lambda link: (-counts[link], link)))
 
 
 def view_of(around: Surroundings, sensor: MountedSensor, optics: Optics) -> View:
-    """Return the view of one stream of the sensor against the bodies fixed to it.
+    """Return the view of a sensor's stream against the bodies that are fixed to the sensor.
 
-    If its field of view is unknown there are no rays, only the links around its origin.
+    If the field of view is unknown, the view has no rays, only the links around its origin.
     """
     into = directions(optics)
     reach = reach_of(optics) if into else 0.0
@@ -85,14 +85,14 @@ def view_of(around: Surroundings, sensor: MountedSensor, optics: Optics) -> View
 
 
 def reach_of(optics: Optics) -> float:
-    """Return the distance in metres up to which bodies are considered."""
+    """Return the distance in metres up to which bodies can block the stream."""
     return min(optics.far or _FAR_M, _FAR_M)
 
 
 def cast(
     sensor: str, optics: Optics, into: tuple[Vector, ...], bodies: Iterable[PosedShape]
 ) -> View:
-    """Return the rays in these directions, unit vectors in the bodies' frame."""
+    """Return the hits of rays in the directions ``into``, unit vectors in the bodies' frame."""
     reach, bundle = reach_of(optics), bundle_of(into)
     nearest: dict[int, tuple[float, int, str]] = {}
     inside: dict[str, float] = {}
@@ -119,17 +119,17 @@ def cast(
 
 
 Hits = list[tuple[int, float]]
-#: By the number of a ray: how far it goes, the order of the body there, and its link.
+#: By the number of a ray: distance to its nearest hit, order of the hit body, and the body's link.
 Nearest = Mapping[int, tuple[float, int, str]]
 
 
 def _read_hits(
     body: PosedShape, into: Sequence[Vector], bundle: Bundle, begins: float, nearest: Nearest
 ) -> tuple[float | None, Hits]:
-    """Return how deep the origin is in the body, and where rays hit it.
+    """Return the depth of the origin in the body, and the rays that hit the body.
 
-    Rays that end before the body ``begins`` may be left out. The depth is None if its mesh cannot
-    be read.
+    The depth is None if the body's mesh cannot be read. Rays that hit another body at a distance
+    below ``begins`` may be left out.
     """
     to_shape = body.pose.inverse()
     if body.shape.kind != "mesh":
@@ -139,7 +139,7 @@ def _read_hits(
     x, y, z = body.shape.size
     turned = [rotate(to_shape.quat_xyzw, direction) for direction in into]
     try:
-        # Numpy and trimesh: 0.3 s that most robots need not wait for.
+        # Importing numpy and trimesh takes 0.3 s, and most robots do not need them.
         from tfcompose.compiler.rays import meshes  # noqa: PLC0415
 
         depth = meshes.depth_in(path, (x, y, z), to_shape.xyz)
@@ -154,14 +154,14 @@ def _read_hits(
 def _hits(
     body: PosedShape, to_shape: Pose, bundle: Bundle, begins: float, nearest: Nearest
 ) -> Hits:
-    """Return the rays that hit a primitive, and where."""
+    """Return the rays that hit a primitive shape, with the distances of the hits."""
     (x, y, z), radius = body.pose.xyz, body.shape.radius
     miss = x * x + y * y + z * z - radius * radius
     hits = []
     for index, direction in bundle.rays_near(x, y, z, radius):
         along = direction[0] * x + direction[1] * y + direction[2] * z
         if miss > 0 and (along <= 0 or along * along < miss):
-            continue  # it passes the sphere around the shape
+            continue  # the ray misses the shape's bounding sphere
         if index in nearest and nearest[index][0] < begins:
             continue
         far = distance(body.shape, to_shape.xyz, rotate(to_shape.quat_xyzw, direction))

@@ -1,4 +1,4 @@
-"""The viewing directions of a stream, and a test of points against its field of view."""
+"""Viewing directions of a stream, and a test whether its field of view contains a point."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import MountedSensor, Optics
 
-#: Maximum number of rays for a stream: columns and rows of a grid; for a lidar, steps of a turn
-#: and rows.
+#: Maximum number of rays of a stream: columns and rows of an image; steps of a turn and rows of a
+#: lidar.
 _IMAGE = (24, 16)
 _CIRCLE, _ROWS = 360, 9
 _COARSE_CIRCLE = 90
 _DISC = 300
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
-#: Angle from the plane of a scanner that still counts as in it, in radians.
+#: Angle in radians up to which a ray counts as in a scanner's plane.
 _FLAT_RAD = 1e-6
 
 
 def different_streams(sensor: MountedSensor) -> Iterator[Optics]:
-    """Yield the sensor's streams without those that repeat an earlier one's frame and view."""
-    known = set()
+    """Yield the sensor's streams, without repeated combinations of frame and view."""
+    visited = set()
     for stream in sensor.optics:
         sight = (
             stream.frame,
@@ -39,8 +39,8 @@ def different_streams(sensor: MountedSensor) -> Iterator[Optics]:
             stream.vertical,
             stream.diagonal,
         )
-        if sight not in known:
-            known.add(sight)
+        if sight not in visited:
+            visited.add(sight)
             yield stream
 
 
@@ -52,8 +52,8 @@ def is_plane(optics: Optics) -> bool:
 def directions(optics: Optics) -> tuple[Vector, ...]:
     """Return unit vectors in the stream's frame, evenly spread over its image or sector.
 
-    None if the field of view is unknown. A plane is sampled every degree, in order, from its first
-    angle to its last.
+    Empty if the field of view is unknown. A scanner's plane is sampled every degree, in order from
+    its first angle to its last.
     """
     return _directions(replace(optics, stream="", frame="", span=_NOWHERE, sources=()))
 
@@ -75,7 +75,7 @@ def _directions(optics: Optics) -> tuple[Vector, ...]:
 
 
 def contains(optics: Optics, point: Vector) -> bool:
-    """Return whether the point, in the stream's frame, is in its image or sector."""
+    """Return whether the point, in the stream's frame, is in the stream's image or sector."""
     if optics.kind == "camera":
         x, y, z = point
         forward, left, up = (-z, -x, y) if optics.backward else (z, -x, -y)
@@ -101,12 +101,12 @@ def _is_in(angle: float, sector: tuple[float, float]) -> bool:
 
 
 def _is_on_circle(angle: float, sector: tuple[float, float]) -> bool:
-    """Return whether the angle is in the sector, which may go on beyond half a turn."""
+    """Return whether the angle is in the sector, which may cross ±180 degrees."""
     return (angle - sector[0] + _FLAT_RAD) % math.tau <= sector[1] - sector[0] + 2 * _FLAT_RAD
 
 
 def _middles(sector: tuple[float, float], count: int) -> list[float]:
-    """Return the middles of ``count`` equal parts."""
+    """Return the middles of ``count`` equal parts of the sector."""
     step = (sector[1] - sector[0]) / count
     return [sector[0] + (index + 0.5) * step for index in range(count)]
 
@@ -123,9 +123,9 @@ def _in_camera(optics: Optics, left: float, up: float, forward: float) -> Vector
 def _image(
     optics: Optics, horizontal: tuple[float, float], vertical: tuple[float, float]
 ) -> tuple[Vector, ...]:
-    """Return the directions of pixels, evenly over the image."""
+    """Return the directions of pixels that are evenly spread over the image."""
     if max(map(abs, (*horizontal, *vertical))) >= math.pi / 2:
-        return ()  # no plane is that wide
+        return ()  # an image plane cannot be that wide
     columns = _middles((math.tan(horizontal[0]), math.tan(horizontal[1])), _IMAGE[0])
     rows = _middles((math.tan(vertical[0]), math.tan(vertical[1])), _IMAGE[1])
     return tuple(
@@ -134,7 +134,7 @@ def _image(
 
 
 def _disc(optics: Optics) -> tuple[Vector, ...]:
-    """Return the directions of pixels, evenly over an equidistant fisheye (Vogel's spiral)."""
+    """Return pixel directions spread evenly over an equidistant fisheye image (Vogel's spiral)."""
     if optics.diagonal is None:
         return ()
     made = []
@@ -155,10 +155,10 @@ def _scan(
     if is_plane(optics):
         elevations = [vertical[0]]
     elif len(optics.elevations) > 1:
-        known = sorted(optics.elevations)
-        count = min(_ROWS, len(known))
+        beams = sorted(optics.elevations)
+        count = min(_ROWS, len(beams))
         elevations = [
-            known[round(index * (len(known) - 1) / (count - 1))] for index in range(count)
+            beams[round(index * (len(beams) - 1) / (count - 1))] for index in range(count)
         ]
     else:
         elevations = _middles(vertical, _ROWS)
@@ -170,16 +170,16 @@ def _scan(
 
 
 def _cone(horizontal: tuple[float, float], vertical: tuple[float, float]) -> tuple[Vector, ...]:
-    """Return directions evenly over an elliptic cone about x."""
+    """Return directions spread evenly over an elliptic cone about x."""
     made = []
     for index in range(_DISC):
         radius, around = math.sqrt((index + 0.5) / _DISC), index * _GOLDEN_ANGLE
-        left = _at(horizontal, radius * math.cos(around))
-        up = _at(vertical, radius * math.sin(around))
+        left = _angle_in(horizontal, radius * math.cos(around))
+        up = _angle_in(vertical, radius * math.sin(around))
         made.append((math.cos(up) * math.cos(left), math.cos(up) * math.sin(left), math.sin(up)))
     return tuple(made)
 
 
-def _at(sector: tuple[float, float], part: float) -> float:
-    """Return the angle at a part of the sector, from -1 to 1."""
+def _angle_in(sector: tuple[float, float], part: float) -> float:
+    """Return the angle at a relative position in the sector, from -1 to 1."""
     return (sector[0] + sector[1]) / 2 + part * (sector[1] - sector[0]) / 2

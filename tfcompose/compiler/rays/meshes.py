@@ -23,7 +23,7 @@ _read = lru_cache(maxsize=32)(read_mesh)
 def distances(
     path: str, scale: Vector, origin: Vector, directions: Sequence[Vector]
 ) -> list[float]:
-    """Return the distance along each ray to its first hit, infinity where it misses.
+    """Return the distance along each ray to the ray's first hit; infinite without a hit.
 
     Rays are in the mesh's frame, in metres; ``directions`` are unit vectors.
 
@@ -55,7 +55,7 @@ def sphere_around(path: str, scale: Vector) -> tuple[Vector, float]:
 def depth_in(path: str, scale: Vector, point: Vector) -> float:
     """Return how deep the point is in the mesh, in metres.
 
-    Negative outside, and for a mesh that is not closed.
+    Negative outside the mesh, and for a mesh that is not closed.
 
     Raises:
         Exception: any error of trimesh's reader, if the file is not a mesh.

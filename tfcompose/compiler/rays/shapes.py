@@ -1,4 +1,7 @@
-"""Intersections of rays with primitives in their frames (URDF: centred, cylinders along z)."""
+"""Intersections of rays with primitive shapes, in the frames of the shapes.
+
+As in URDF, a shape is centred on the origin, and a cylinder lies along z.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,9 @@ _TINY = 1e-12
 
 
 def depth_in(shape: Shape, point: Vector) -> float:
-    """Return the depth of the point, in the shape's frame, in metres; negative outside.
+    """Return the depth of the point in the shape, in metres; negative outside.
 
-    Not for meshes.
+    The point is in the shape's frame. Meshes are not supported.
     """
     x, y, z = point
     size = shape.size
@@ -30,9 +33,9 @@ def depth_in(shape: Shape, point: Vector) -> float:
 
 
 def distance(shape: Shape, origin: Vector, direction: Vector) -> float:
-    """Return the distance along the ray to the shape, from outside; infinite for a miss.
+    """Return the distance in metres along the ray to the shape; infinite without a hit.
 
-    Not for meshes.
+    ``origin`` is outside the shape. Meshes are not supported.
     """
     size = shape.size
     match shape.kind:
@@ -63,7 +66,7 @@ def _sphere(radius: float, origin: Vector, direction: Vector) -> float:
 
 
 def _tube(radius: float, length: float, origin: Vector, direction: Vector) -> float:
-    """Return where the ray enters the side of a cylinder, from outside."""
+    """Return the distance at which the ray enters the side of a cylinder from outside."""
     a = direction[0] ** 2 + direction[1] ** 2
     if a < _TINY:
         return math.inf
@@ -91,7 +94,10 @@ def _caps(radius: float, length: float, origin: Vector, direction: Vector) -> fl
 
 
 def _box(size: tuple[float, ...], origin: Vector, direction: Vector) -> float:
-    """Return where the ray enters the box, from outside (the slabs of Kay and Kajiya)."""
+    """Return the distance at which the ray enters the box from outside.
+
+    The function uses the slab method of Kay and Kajiya.
+    """
     enters, leaves = 0.0, math.inf
     for extent, start, step in zip(size, origin, direction, strict=True):
         if abs(step) < _TINY:

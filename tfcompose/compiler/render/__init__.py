@@ -1,1 +1,1 @@
-"""Text output of commands: findings for people and programs, trees, and poses."""
+"""Text output of commands: findings for people and for programs, trees, and poses."""

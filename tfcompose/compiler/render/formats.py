@@ -1,4 +1,4 @@
-"""Findings for programs: a JSON list, annotations of a GitHub workflow, SARIF, and JUnit's XML."""
+"""Findings for programs: a JSON list, annotations of a GitHub workflow, SARIF, and JUnit XML."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def render_json(findings: Sequence[Finding]) -> str:
-    """Return the findings as a JSON list; an unknown place is null."""
+    """Return the findings as a JSON list. The place of a finding without a span is null."""
     return (
         json.dumps([_entry(finding) for finding in findings], indent=2, ensure_ascii=False) + "\n"
     )
@@ -50,7 +50,7 @@ def _place(span: Span | None) -> dict[str, Any]:
 
 
 def render_github(findings: Sequence[Finding]) -> str:
-    """Return the findings as workflow commands."""
+    """Return the findings as GitHub workflow commands."""
     return "".join(_annotation(finding) for finding in findings)
 
 
@@ -86,9 +86,9 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 def render_sarif(
     findings: Sequence[Finding], version: str, address_of: CodeAddress = no_address
 ) -> str:
-    """Return the findings as one SARIF run, with the page of each code.
+    """Return the findings as a SARIF run, with the address of each code's page.
 
-    ``address_of`` returns the URL of a code's page, or an empty text.
+    ``address_of`` returns the URL of a code's page, or an empty string.
     """
     codes = sorted({finding.code for finding in findings})
     run = {
@@ -152,7 +152,7 @@ def _location(span: Span) -> dict[str, Any]:
     }
 
 
-# XML 1.0 has no place for these, not even escaped.
+# XML 1.0 forbids these characters, even escaped.
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _XML_ESCAPES = {
     "&": "&amp;",
@@ -173,9 +173,10 @@ def render_junit(
     failing: frozenset[str],
     seconds: float,
 ) -> str:
-    """Return a test suite of cases (group, name, findings).
+    """Return a test suite. Each case is (group, name, findings).
 
-    A case fails if a finding has a ``failing`` severity. Its other findings are in its output.
+    A case fails if a finding has one of the ``failing`` severities. The output of a case contains
+    its other findings. ``seconds`` is the duration of the suite.
     """
     rows, failed, count = [], 0, 0
     for group, name, findings in cases:
@@ -187,9 +188,11 @@ def render_junit(
             f' message="{_xml(finding.message)}">{_xml(_details(finding))}</failure>\n'
             for finding in fatal[:1]
         )
-        others = [*fatal[1:], *(finding for finding in findings if finding not in fatal)]
-        if others:
-            body += f"    <system-out>{_xml(chr(10).join(map(_details, others)))}</system-out>\n"
+        remaining = [*fatal[1:], *(finding for finding in findings if finding not in fatal)]
+        if remaining:
+            body += (
+                f"    <system-out>{_xml(chr(10).join(map(_details, remaining)))}</system-out>\n"
+            )
         head = f'  <testcase classname="{_xml(f"{suite}.{group}")}" name="{_xml(name)}" time="0"'
         rows.append(f"{head}>\n{body}  </testcase>\n" if body else f"{head}/>\n")
     counts = f'tests="{count}" failures="{failed}" errors="0" time="{seconds:.3f}"'

@@ -1,4 +1,4 @@
-"""A pose for people and for programs: always "pose of B in A"."""
+"""A pose for people and for programs, always as the pose of B in A."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def pose_text(parent: str, child: str, pose: Pose, when: str = "", decimals: int = 4) -> str:
-    """Return the pose of ``child`` in ``parent``.
+    """Return the pose of ``child`` in ``parent`` as text.
 
-    Metres, quaternion x y z w, and fixed-axis angles in radians and degrees. Degrees have two
-    decimals fewer.
+    The text has metres, the quaternion x y z w, and fixed-axis angles in radians and in degrees.
+    Degrees have two decimals fewer than ``decimals``.
     """
     degrees = tuple(math.degrees(angle) for angle in pose.rpy)
     return (
@@ -27,7 +27,7 @@ def pose_text(parent: str, child: str, pose: Pose, when: str = "", decimals: int
 
 
 def pose_json(parent: str, child: str, pose: Pose, **more: float | None) -> str:
-    """Return the pose as one line of JSON; angles in radians."""
+    """Return the pose as a line of JSON, with angles in radians."""
     rpy = tuple(angle + 0.0 for angle in pose.rpy)  # −0 becomes 0
     row = {
         "parent": parent,

@@ -1,4 +1,4 @@
-"""Findings for people: the place, the line with a caret under it, notes and help."""
+"""Findings for people: the place, the source line with a caret, notes and help."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _LONGEST_LINE = 160
 _LONGEST_MESSAGE = 1000
 
 
-#: Returns the address of a code's page; empty: it has none.
+#: Returns the address of a code's page, or an empty string.
 CodeAddress = Callable[[str], str]
 
 
 def no_address(code: str) -> str:
-    """Return no address, for any code."""
+    """Return an empty address for any code."""
     del code
     return ""
 
@@ -45,8 +45,8 @@ def render_text(
 ) -> str:
     """Return the findings as text.
 
-    ``line_of`` returns a line of a file (from 1), or None if it cannot be read. A code that has an
-    address becomes a link (OSC 8).
+    ``line_of`` returns a line of a file, numbered from 1, or None for an unreadable file. A code
+    with an address becomes a link (OSC 8).
     """
     paint = _Paint(address_of, colour=colour)
     return "".join(_format_finding(finding, line_of, paint) for finding in findings)
@@ -80,17 +80,17 @@ def _format_finding(
     if finding.span:
         lines += _excerpt(finding.span, line_of, paint, shade)
     for note in finding.notes:
-        at = f"{note.span}: " if note.span else ""
-        lines.append(f"   {paint('note', BLUE)}: {_printable(at + note.message)}")
+        location = f"{note.span}: " if note.span else ""
+        lines.append(f"   {paint('note', BLUE)}: {_printable(location + note.message)}")
     if finding.help:
         lines.append(f"   {paint('help', GREEN)}: {_printable(finding.help)}")
     return "\n".join(lines) + "\n"
 
 
 def _printable(text: str) -> str:
-    """Return the text on one line of bounded length, without control characters."""
-    shown = text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]}…"
-    return visible(shown)
+    """Return the text as a line of limited length without control characters."""
+    shortened = text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]}…"
+    return visible(shortened)
 
 
 def _excerpt(
@@ -101,19 +101,22 @@ def _excerpt(
         return []
     start = span.column - 1
     end = span.end_column - 1 if span.end_line == span.line else len(line.rstrip())
-    shown, skipped = line, max(0, start - _LONGEST_LINE // 2)
+    line_text, skipped = line, max(0, start - _LONGEST_LINE // 2)
     if len(line) > _LONGEST_LINE:
-        shown = line[skipped : skipped + _LONGEST_LINE]
+        line_text = line[skipped : skipped + _LONGEST_LINE]
     else:
         skipped = 0
-    width = max(1, min(end, skipped + len(shown)) - start)
-    lead = re.sub(r"[^\t]", " ", shown[: start - skipped])
-    shown = mask_invisible(shown.rstrip(), "?", kept="\t")
-    return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
+    width = max(1, min(end, skipped + len(line_text)) - start)
+    lead = re.sub(r"[^\t]", " ", line_text[: start - skipped])
+    line_text = mask_invisible(line_text.rstrip(), "?", kept="\t")
+    return [f"{span.line:>5} | {line_text}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 
 def summary(findings: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
-    """Return the last line: counts of findings and files, and why warnings exit with 0."""
+    """Return the last line: the numbers of findings and files.
+
+    If there are only warnings and they do not fail the command, the line says so.
+    """
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = len(findings) - errors
     where = f"in {plural(files, 'file')}"

@@ -1,6 +1,6 @@
 """A robot's tree as text, and as a graph for drawing.
 
-Each edge has its kind, owner, rate and pose.
+Each edge is shown with kind, owner, rate and pose.
 """
 
 from __future__ import annotations
@@ -20,16 +20,18 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Robot
 
 
-#: Between the facts of a line.
+#: Separator between the facts of a line.
 GAP = "  "
 
 
 def tree(robot: Robot, columns: int | None = None) -> str:
-    """Return the tree, one frame per line: kind, owner, rate.
+    """Return the tree as text, a frame on each line.
 
-    Position in metres and rpy in degrees, unless zero. If a line is wider than ``columns``, facts
-    directly follow the names and kinds implied by owners are omitted; then ``static`` is omitted
-    where another process is the owner; finally facts continue on the next line.
+    After the frame follow its edge's kind, owner, rate and pose. The pose is the position in
+    metres and rpy in degrees; zero values are left out. Lines wider than ``columns`` are shortened
+    in three steps. First, facts directly follow the name, and a kind that the owner implies is
+    omitted. Next, the kind ``static`` is omitted for any owner. Finally, facts continue on the
+    next line.
     """
     children = robot.children()
     rows = [
@@ -70,21 +72,21 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
 
 
 def _fit_rows(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:
-    """Return the rows as lines of at most this many columns, if names fit."""
+    """Return the rows as lines of at most ``columns`` columns, if the names fit."""
     for kinds in ({"static", "joints", "dynamic"}, {"dynamic"}):
         facts = [_facts(edge, kinds) for _, _, edge in rows]
         drawing = [(lines, name, some) for (lines, name, _), some in zip(rows, facts, strict=True)]
-        found = [GAP.join([lines + name, *some]) for lines, name, some in drawing]
-        if _widest(found) <= columns:
-            return found
+        fitted = [GAP.join([lines + name, *some]) for lines, name, some in drawing]
+        if _widest(fitted) <= columns:
+            return fitted
     return [line for some in wrap_rows(drawing, columns) for line in some]
 
 
 def wrap_rows(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> list[list[str]]:
-    """Return each row of a drawing as lines of at most this many columns.
+    """Return, for each row of a tree, lines of at most ``columns`` columns.
 
-    A row is the tree lines, the name, and facts. Facts that do not fit continue below. If names do
-    not fit either, a level takes two columns.
+    A row is the tree lines, a name, and facts. Facts that do not fit continue on the next line. If
+    a name does not fit, each level is indented by only two columns.
     """
     if _widest(lines + name for lines, name, _ in rows) > columns:
         rows = [(_narrow(lines), name, facts) for lines, name, facts in rows]
@@ -96,9 +98,9 @@ def wrap_rows(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> l
 
 
 def _facts(edge: Edge | None, kinds: Collection[str]) -> list[str]:
-    """Return what is said of an edge.
+    """Return the facts about an edge.
 
-    Its kind if it is among these, and its owner does not say as much.
+    They include its kind if ``kinds`` contains the kind and the owner does not imply it.
     """
     if edge is None:
         return []
@@ -108,7 +110,7 @@ def _facts(edge: Edge | None, kinds: Collection[str]) -> list[str]:
 
 
 def _narrow(lines: str) -> str:
-    """Return the lines of a drawing with two columns a level, which are four."""
+    """Return the tree lines with two columns for each level instead of four."""
     return lines.replace("│   ", "│ ").replace("    ", "  ").replace("── ", " ")
 
 
@@ -132,12 +134,15 @@ def _rate(edge: Edge) -> str:
 
 
 def pose_text(edge: Edge) -> str:
-    """Return the edge's pose as in ``short_pose``, or a note that only its owner knows it."""
+    """Return the edge's pose as in ``short_pose``.
+
+    If only the owner knows the pose, return "pose unknown".
+    """
     return short_pose(edge.pose) if edge.pose_known else "pose unknown"
 
 
 def edge_facts(edge: Edge) -> str:
-    """Return kind, owner, rate and pose of an edge on one line."""
+    """Return kind, owner, rate and pose of an edge on a single line."""
     facts = (edge.kind, f"by {edge.owner}", _rate(edge), pose_text(edge), _switch_of(edge))
     return GAP.join(fact for fact in facts if fact)
 
@@ -147,7 +152,7 @@ def _switch_of(edge: Edge) -> str:
 
 
 def short_pose(pose: Pose) -> str:
-    """Return position in metres and rotation (rpy) in degrees, without zero ones."""
+    """Return the position in metres and rpy in degrees; zero values are left out."""
     parts = []
     xyz = clean_xyz(pose.xyz)
     if any(xyz):
@@ -159,9 +164,9 @@ def short_pose(pose: Pose) -> str:
 
 
 def graph_of(robot: Robot, *, poses: bool = False) -> Graph:
-    """Return the tree of a robot with its final names.
+    """Return the robot's tree as a graph, with final names.
 
-    Sensors are groups. Owners are in tree order.
+    Each sensor is a group. Owners are in tree order.
     """
     presets = {sensor.name: sensor.preset for sensor in robot.sensors}
     groups: dict[str, list[str]] = {}

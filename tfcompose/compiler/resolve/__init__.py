@@ -1,7 +1,7 @@
 """Resolution of a ``RobotSpec`` into a ``Robot``.
 
-Expand presets, include parts, solve poses, assign owners. Anything that cannot be resolved is a
-finding, and the robot continues without it.
+Resolution expands presets, includes parts, solves poses and assigns owners. An entry that cannot
+be resolved is reported as a finding, and the robot is built without this entry.
 """
 
 from tfcompose.compiler.resolve.presets import Library

@@ -1,6 +1,7 @@
-"""``ros2_control`` and ``xml``: URDF elements besides links and joints, checked against the robot.
+"""``ros2_control`` and ``xml``: URDF elements other than links and joints.
 
-The places of a raw block are lines of the robot file.
+This module checks these elements against the robot. Places in a raw block are places in the robot
+file.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _NamesOrExcused(Collection[str]):
-    """Names, and names that may be missing because an entry was refused."""
+    """Names, plus names that may be missing because an entry was rejected."""
 
     names: Sequence[str]
-    #: Tell whether a refused entry may have brought the name.
-    excuses: Callable[[str], bool]
+    #: Returns whether a rejected entry may have defined the name.
+    tolerates: Callable[[str], bool]
 
     def __contains__(self, name: object) -> bool:
-        return name in self.names or (isinstance(name, str) and self.excuses(name))
+        return name in self.names or (isinstance(name, str) and self.tolerates(name))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -40,23 +41,23 @@ class _NamesOrExcused(Collection[str]):
 
 
 def take_blocks(draft: Draft) -> Iterator[Finding]:
-    """Take the hardware and the raw blocks of the file. Parts add theirs after it."""
+    """Add the hardware and the raw blocks of the file to the draft. Parts add theirs later."""
     robot, spec = draft.robot, draft.spec
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
     hardware = tuple(
         _hardware(name, declared, spec) for name, declared in spec.ros2_control.items()
     )
-    yield from unknown_joints(hardware, _NamesOrExcused(moving, robot.excuses))
+    yield from unknown_joints(hardware, _NamesOrExcused(moving, robot.tolerates))
     children = {edge.child for edge in robot.edges}
     frames = [frame for frame in robot.frames if frame in robot.links or frame in children]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
-    known = (_NamesOrExcused(frames, robot.excuses), _NamesOrExcused(joints, robot.excuses))
+    names = (_NamesOrExcused(frames, robot.tolerates), _NamesOrExcused(joints, robot.tolerates))
     blocks = []
     for name, text in spec.xml.items():
         path: Path = ("xml", name)
         try:
             root = read_block(text, spec.spans.file)
-            findings = [*faults_of(root, *known), *find_unexpanded(text, spec.spans.file)]
+            findings = [*faults_of(root, *names), *find_unexpanded(text, spec.spans.file)]
             blocks.append(Block(name, spec.span_of(path), text))
         except RejectedError as error:
             findings = [*error.findings]
@@ -98,17 +99,17 @@ def _component(kind: str, name: str, spec: ComponentSpec, span: Span) -> Hardwar
 
 
 def _in_file(span: Span | None, text: str, spec: RobotSpec, path: Path) -> Span:
-    """Return the place in the robot file of a place in the block, whose text starts at line 2.
+    """Convert a place in the text of a raw block to a place in the robot file.
 
-    Only in a literal block (``|``) are the lines those of the file; elsewhere it is the whole
-    value.
+    The text starts at line 2 of the block's document. Lines correspond only in a literal block
+    (``|``). For any other scalar the place is the complete value.
     """
     value, key = spec.span_of(path), spec.key_span(path)
     lines = text.rstrip("\n").count("\n") + 1
     if span is None or value.end_line - value.line < lines:
         return value
     line = value.line + min(max(span.line - 1, 1), lines)
-    indent = key.column + 1  # as most people write it: two more than the key
+    indent = key.column + 1  # assumes the usual indentation: two more than the key
     return Span(
         value.file,
         line,

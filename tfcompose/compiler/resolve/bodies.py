@@ -33,13 +33,13 @@ FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 @dataclass(slots=True)
 class Bodies:
-    """Make links from the spec."""
+    """Builds links from the spec."""
 
     spec: RobotSpec
     packages: Packages = field(default_factory=Packages)
     #: Findings about mesh and texture files.
     findings: list[Finding] = field(default_factory=list)
-    _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(
+    _parts_by_id: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(
         default_factory=dict
     )
 
@@ -47,10 +47,10 @@ class Bodies:
         """Return the link with its shapes and, if it has a mass, its inertia."""
         span = self.spec.key_span(("links", name))
         if (
-            id(body) not in self._known
-        ):  # aliases of one anchor are one object, and have the same shapes
-            self._known[id(body)] = self._parts(body, ("links", name))
-        visuals, collisions, inertial = self._known[id(body)]
+            id(body) not in self._parts_by_id
+        ):  # aliases of an anchor are the same object and have the same shapes
+            self._parts_by_id[id(body)] = self._parts(body, ("links", name))
+        visuals, collisions, inertial = self._parts_by_id[id(body)]
         if inertial and inertial.span:
             inertial = replace(inertial, span=span)
         return Link(name, span, visuals, collisions, inertial, has_mass=body.inertial is not None)
@@ -76,7 +76,7 @@ class Bodies:
         """Return the shape.
 
         Raises:
-            ValueError: if it has no form.
+            ValueError: if the spec names no shape, such as box or mesh.
         """
         material = None
         if shape.material:
@@ -112,9 +112,10 @@ class Bodies:
         return tuple(made)
 
     def _material(self, declared: specs.MaterialSpec, path: Path) -> Material:
-        """Return the colour with its name.
+        """Return the material.
 
-        One without is named after its parts, so that URDF keeps them apart.
+        A material without a name is named after its colour and texture, so that URDF keeps
+        different materials apart.
         """
         texture = None
         if declared.texture is not None:
@@ -160,7 +161,7 @@ class Bodies:
     def moments(self, shapes: tuple[Shape, ...], span: Span) -> Moments | None:
         """Return the moments of the shapes at density 1 in the link's axes, None if unknown.
 
-        If they are unknown, the reason is a finding.
+        If the moments are unknown, add a finding with the reason.
         """
         parts: list[Moments] = []
         for shape in shapes:
@@ -170,7 +171,7 @@ class Bodies:
             measure = self.packages.disk.moments if self.packages.disk else None
             if measure is None or (
                 shape.mesh.path and self._is_missing(shape.mesh.path)
-            ):  # that has been said
+            ):  # already reported
                 return None
             if not shape.mesh.path:
                 message = f"{shape.mesh.uri}: it is not found here, and has no volume"
@@ -179,7 +180,7 @@ class Bodies:
                 return None
             try:
                 x, y, z = shape.size
-                parts.append(measure(shape.mesh.path, (x, y, z)).at(shape.pose))
+                parts.append(measure(shape.mesh.path, (x, y, z)).moved(shape.pose))
             except UnmeasurableError as error:
                 self.findings.append(
                     finding(error.code, f"{shape.mesh.uri}: {error}", span, help=error.advice)
@@ -192,28 +193,33 @@ class Bodies:
 
 
 def with_colours(links: dict[str, Link]) -> dict[str, Link]:
-    """Return the links with plain material names given the colour of their first use.
+    """Return the links with a colour for each material that has only a name.
 
-    A name without a colour elsewhere may be the name of a colour.
+    Such a material gets the colour of another material with its name. If there is none, its name
+    may be the name of a colour.
     """
-    known: dict[str, Material] = {}
+    by_name: dict[str, Material] = {}
     for material in materials(links):
         if material.rgba or material.texture:
-            known.setdefault(material.name, material)
+            by_name.setdefault(material.name, material)
     for material in materials(links):
         if material.name in COLOURS:
-            known.setdefault(material.name, replace(material, rgba=(*COLOURS[material.name], 1.0)))
+            by_name.setdefault(
+                material.name, replace(material, rgba=(*COLOURS[material.name], 1.0))
+            )
     bare = {
         material.name
         for material in materials(links)
-        if not (material.rgba or material.texture) and material.name in known
+        if not (material.rgba or material.texture) and material.name in by_name
     }
     return (
-        {name: _colour_link(link, known, bare) for name, link in links.items()} if bare else links
+        {name: _colour_link(link, by_name, bare) for name, link in links.items()}
+        if bare
+        else links
     )
 
 
-def _colour_link(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
+def _colour_link(link: Link, materials: dict[str, Material], bare: set[str]) -> Link:
     def shape(visual: Shape) -> Shape:
         is_bare = (
             visual.material
@@ -221,7 +227,7 @@ def _colour_link(link: Link, known: dict[str, Material], bare: set[str]) -> Link
             and not (visual.material.rgba or visual.material.texture)
         )
         return (
-            replace(visual, material=known[visual.material.name])
+            replace(visual, material=materials[visual.material.name])
             if visual.material and is_bare
             else visual
         )

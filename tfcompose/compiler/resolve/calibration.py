@@ -1,9 +1,9 @@
 """Measured poses from calibration files, matched with edges.
 
-An entry is the pose of its child in its parent. If the child is a sensor's inner frame, or the
-parent is not the edge's, the edge is solved for, as with ``place`` and ``relative_to``. The given
-reader reads the files. A fault in one is reported at the place in the robot file, with a note into
-the calibration file.
+A calibration entry is the pose of its child in its parent. If the child is an inner frame of the
+sensor, or the parent is not the edge's parent, the edge's pose is solved, as with ``place`` and
+``relative_to``. A given function reads the files. An error in a calibration file is reported at
+the place in the robot file, with a note that points into the calibration file.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _DEFAULT_LIMIT = CalibrationLimit()
 
 
 def measure(draft: Draft) -> Iterator[Finding]:
-    """Give mounts the poses of calibrations. ``solve_poses`` makes them those of the edges."""
+    """Assign calibrations to mount edges; ``solve_poses`` later computes the edges' poses."""
     work = _Calibrations(draft, _Files(draft.read))
     for edge in draft.edges:
         if group := group_of(edge):
@@ -53,18 +53,18 @@ def measure(draft: Draft) -> Iterator[Finding]:
 
 @dataclass(slots=True)
 class _Files:
-    """Calibration files, each read once."""
+    """Calibration files. Each file is read only once."""
 
     read: Reader | None
     findings: list[Finding] = field(default_factory=list)
-    _known: dict[tuple[str, str], CalibrationFile] = field(default_factory=dict)
+    _files: dict[tuple[str, str], CalibrationFile] = field(default_factory=dict)
 
     def get(self, named: str, span: Span, form: str = "auto") -> CalibrationFile:
-        """Return the file's entries; its faults are reported once."""
+        """Return the entries of the file. Its errors are reported only once."""
         path = find_path(named, span)
-        if (path, form) not in self._known:
-            self._known[path, form] = self._load(path, span, form)
-        return self._known[path, form]
+        if (path, form) not in self._files:
+            self._files[path, form] = self._load(path, span, form)
+        return self._files[path, form]
 
     def _load(self, path: str, span: Span, form: str) -> CalibrationFile:
         if self.read is None:
@@ -90,7 +90,7 @@ class _Match:
 
     @property
     def names(self) -> tuple[str | None, str | None]:
-        """The names of parent and child as the edge has them."""
+        """The names of parent and child in the direction of the edge."""
         parent, child = self.entry.parent, self.entry.child
         return (child, parent) if self.inverted else (parent, child)
 
@@ -98,9 +98,9 @@ class _Match:
 def _matches(
     entries: Sequence[CalibrationEntry], parents: Collection[str], children: Collection[str]
 ) -> list[_Match]:
-    """Return the entries of a child in a parent.
+    """Return the entries that have a parent from ``parents`` and a child from ``children``.
 
-    Those the other way round only if there is none.
+    If there is none, return entries in the opposite direction.
     """
     straight = [
         _Match(entry, inverted=False)
@@ -124,7 +124,7 @@ class _Calibrations:
     inside: dict[Path, set[str]] = field(default_factory=dict)
 
     def measure(self, index: int) -> None:
-        """Apply an edge's own ``calibration``."""
+        """Apply the edge's own ``calibration`` key."""
         edge, keys = self.draft.edges[index], self.draft.keys[index]
         if not isinstance(keys, MountKeys) or not keys.calibration:
             return
@@ -140,18 +140,21 @@ class _Calibrations:
                 self._take(index, match, file, declared, span)
 
     def _span(self, path: Path, position: int) -> Span:
-        """Return where a list names a file, or the entry that stands for a list of one."""
+        """Return the span of a file in a list, or of the entry if it is written without a list."""
         item = (*path, position)
         spans = self.draft.spec.spans
         return spans.span_of((*(item if spans.has(item) else path), "file"))
 
     def _valid(self, declared: Sequence[CalibrationFileSpec], path: Path) -> list[int]:
-        """Return the positions of the calibrations that hold; there being none is a finding."""
+        """Return the positions of the calibrations that are valid today.
+
+        If none is valid, add a finding.
+        """
         validated = self.draft.validated
         if any(refused[: len(path)] == path for refused in validated.refused):
             return []
         day = validated.inputs.day
-        valid = [at for at, calibration in enumerate(declared) if calibration.holds(day)]
+        valid = [index for index, calibration in enumerate(declared) if calibration.holds(day)]
         if declared and not valid:
             names = ", ".join(calibration.file for calibration in declared)
             message = (
@@ -170,7 +173,7 @@ class _Calibrations:
     def _several_valid(
         self, name: str, declared: Sequence[CalibrationSpec], valid: Sequence[int], path: Path
     ) -> None:
-        """Report that a mount has several calibrations for one day."""
+        """Report that a mount has several calibrations that are valid on the same day."""
         first, second = valid[:2]
         files = ", ".join(declared[position].file for position in valid)
         day = self.draft.validated.inputs.day
@@ -181,7 +184,7 @@ class _Calibrations:
         self.findings.append(finding("TF613", message, span, help=advice, notes=notes))
 
     def _around(self, index: int) -> tuple[set[str], set[str]]:
-        """Return the frame names that the edge's parent and child can have in its entry."""
+        """Return the frames that a calibration entry may name as the edge's parent and child."""
         edge = self.draft.edges[index]
         relative_to = self.draft.keys[index].relative_to
         return {edge.parent, relative_to or edge.parent}, self.inside.get(
@@ -226,15 +229,15 @@ class _Calibrations:
             ),
             None,
         )
-        shown = [entry for entry in file.entries if near in {entry.child, entry.parent}] or list(
+        entries = [entry for entry in file.entries if near in {entry.child, entry.parent}] or list(
             file.entries
         )
-        notes = [Note(f"{entry.name} is defined here", entry.span) for entry in shown[:1]]
-        there = (
+        notes = [Note(f"{entry.name} is defined here", entry.span) for entry in entries[:1]]
+        contents = (
             f"it has {', '.join(entry.name for entry in file.entries[:6])}; parent: and child:"
             " pick one"
         )
-        advice = f"did you mean {near}? {there}" if near else there
+        advice = f"did you mean {near}? {contents}" if near else contents
         message = f"{file.file} holds no pose of {child} in {parent}"
         self.findings.append(finding("TF612", message, span, help=advice, notes=notes))
 
@@ -258,7 +261,7 @@ class _Calibrations:
         declared: CalibrationSpec | None,
         span: Span,
     ) -> None:
-        """Give the edge what an entry says."""
+        """Assign a calibration entry to the edge."""
         self.used.add(id(match.entry))
         edge, keys, frames = self.draft.edges[index], self.draft.keys[index], self.draft.frames
         parent, child = match.names
@@ -285,7 +288,7 @@ class _Calibrations:
         self.draft.edges[index] = replace(edge, calibration=calibration)
 
     def apply_files(self) -> None:
-        """Apply every entry of the files under ``calibrations`` that hold."""
+        """Apply every entry of the valid files under ``calibrations``."""
         declared, path = self.draft.spec.calibrations, ("calibrations",)
         valid = self._valid(declared, path)
         for position, calibration in enumerate(declared):
@@ -295,7 +298,7 @@ class _Calibrations:
                 self._apply(file, span)
 
     def _apply(self, file: CalibrationFile, span: Span) -> None:
-        """Apply every entry of a file; one that nothing takes is a finding."""
+        """Apply every entry of a file, and report entries that fit no edge."""
         for index in self.draft.keys:
             self._apply_to(index, file, span)
         self._report_unused(file, span)
@@ -303,7 +306,9 @@ class _Calibrations:
     def _apply_to(self, index: int, file: CalibrationFile, span: Span) -> None:
         edge, matches = self.draft.edges[index], self._fitting(index, file)
         measured = edge.calibration
-        if len(matches) > 1:
+        if self._takes_precedence(index, span):
+            self.used.update(id(match.entry) for match in matches)
+        elif len(matches) > 1:
             self._ambiguous(
                 f"{edge.name}: {len(matches)} entries of {file.file} fit", span, matches
             )
@@ -319,16 +324,28 @@ class _Calibrations:
         elif matches:
             self._take(index, matches[0], file, None, span)
 
+    def _takes_precedence(self, index: int, span: Span) -> bool:
+        """Return whether a mount's own ``calibration`` overrides the files of all mounts.
+
+        It does if it is an empty list, or an overlay sets it.
+        """
+        keys = self.draft.keys[index]
+        if not isinstance(keys, MountKeys) or "calibration" not in keys.model_fields_set:
+            return False
+        spans = self.draft.spec.spans
+        file = spans.key_span((*self.draft.edges[index].entry, "calibration")).file
+        return not keys.calibration or (file != span.file and file in spans.overlays)
+
     def _fitting(self, index: int, file: CalibrationFile) -> list[_Match]:
         if not isinstance(self.draft.keys[index], MountKeys):
             return []
-        own, inside = self._around(index)
+        direct, inside = self._around(index)
         elsewhere = [
             entry
             for entry in file.entries
             if entry.parent in self.draft.frames and entry.parent not in inside
         ]
-        return _matches(file.entries, own, inside) or [
+        return _matches(file.entries, direct, inside) or [
             _Match(entry, inverted=False) for entry in elsewhere if entry.child in inside
         ]
 
@@ -336,7 +353,7 @@ class _Calibrations:
         for entry in file.entries:
             if (
                 id(entry) in self.used or self.draft.spec.spans.is_variant
-            ):  # the file alone may use it
+            ):  # the robot file without overlays may use it
                 continue
             advice = (
                 "calibration: beside the mount takes it"
@@ -351,5 +368,8 @@ class _Calibrations:
 
 
 def _alias(name: str) -> set[str]:
-    """Return the name, and what Kalibr's results call the IMU that its input calls imu0."""
+    """Return the possible names of a device.
+
+    Kalibr calls an IMU imu0 in its input, and imu in its results.
+    """
     return {name, "imu"} if name == "imu0" else {name}

@@ -1,8 +1,8 @@
-"""Settlement of claims: edges that a node publishes by default.
+"""Resolution of claims, edges that a node publishes by default.
 
-A claim is switched off if another process owns the edge, and otherwise gets the names of the
-robot's frames. A claim that cannot be settled by parameters of a process that tfcompose starts is
-a finding with the exact switch.
+If another process owns the edge, tfcompose writes the parameter that stops the node from
+publishing it. Otherwise the claim gets the names of the robot's frames. Parameters cannot always
+do this, for example if another program starts the process. Then a finding names the parameter.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def settle_claims(draft: Draft) -> Iterator[Finding]:
-    """Settle claims by parameters, and yield findings about the rest."""
+    """Resolve claims by parameters, and yield findings about claims that cannot be resolved."""
     robot = draft.robot
     if not any(
         declared.nodes or declared.publishes or preset_of(declared.node)
@@ -52,7 +52,7 @@ class _Claims:
     findings: list[Finding] = field(default_factory=list)
     claims: list[Claim] = field(default_factory=list)
     publishers: dict[tuple[str, str], str] = field(default_factory=dict)
-    known: set[str] = field(default_factory=set)
+    preset_processes: set[str] = field(default_factory=set)
 
     def process(self, process: Process) -> Process:
         """Return the process with the parameters of its nodes."""
@@ -64,16 +64,16 @@ class _Claims:
             return process
         claimants = [self._node(process, node) for node in process.ros_nodes]
         if all(claimant is not None for claimant in claimants):
-            self.known.add(process.name)
+            self.preset_processes.add(process.name)
         nodes = []
         for node, claimant in zip(process.ros_nodes, claimants, strict=True):
             nodes.append(claimant.settle() if claimant else node)
         return replace(process, ros_nodes=tuple(nodes))
 
     def edge(self, edge: Edge) -> Edge:
-        """Return the edge with its publisher.
+        """Return the edge with the node that publishes it.
 
-        An owner of whose nodes none is known to publish it is a finding.
+        If no node of the owner is known to publish the edge, add a finding.
         """
         node = self.publishers.get((edge.owner, edge.child))
         if node is not None:
@@ -85,7 +85,7 @@ class _Claims:
             return edge
         span = edge.owner_at or edge.span
         entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
-        if owner.name in self.known and owner.kind != "simulate":
+        if owner.name in self.preset_processes and owner.kind != "simulate":
             message = f"{owner.name} is not known to publish {edge.name}"
             advice = (
                 f"if it does, add {entry} to {owner.name}; off can name the parameter that"
@@ -102,7 +102,7 @@ class _Claims:
         return edge
 
     def _node(self, process: Process, node: Node) -> Claimant | None:
-        """Return the known facts about a node and its parameters, or None."""
+        """Return the node with its claims and parameters, None for an unknown node."""
         declared = self.spec.processes[process.name]
         inner = declared.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
         name = (
@@ -140,9 +140,9 @@ class _Claims:
         return None
 
     def _of_one(self, claimant: Claimant) -> tuple[ClaimSpec, ...]:
-        """Return the claim that a node makes which makes one out of several.
+        """Return the claim in effect, for a node that publishes only one of several edges.
 
-        Its own, or the one that is chosen.
+        This is the claim whose edge the process owns, otherwise the claim that parameters select.
         """
         for claim in claimant.claims:
             if self._is_own(claimant, claim):
@@ -156,7 +156,7 @@ class _Claims:
         return claimant.claims[:1]
 
     def _set_names(self, claimant: Claimant) -> None:
-        """Write the parameters that hold frame names, and those that give them their meaning."""
+        """Set the parameters that hold frame names, and fixed parameters of the node's preset."""
         preset = claimant.preset
         if preset is None:
             return
@@ -167,9 +167,13 @@ class _Claims:
             parameter = described.parameter
             if described.instead in claimant.params:
                 parameter = described.instead
-            own = claimant.params.get(parameter)
-            if own is not None and not claimant.roles.is_bound(role) and self._is_frame(own):
-                continue  # the tree leaves it open
+            setting = claimant.params.get(parameter)
+            if (
+                setting is not None
+                and not claimant.roles.is_bound(role)
+                and self._is_frame(setting)
+            ):
+                continue  # the tree does not determine this frame
             self._set(claimant, parameter, self.robot.final(frame))
         for key, value in preset.set.items():
             self._set(claimant, key, value)
@@ -178,13 +182,13 @@ class _Claims:
         return any(name == self.robot.final(frame) for frame in self.robot.frames)
 
     def _set(self, claimant: Claimant, key: str, value: Any) -> None:
-        own = claimant.params.get(key)
-        if own is None:
+        setting = claimant.params.get(key)
+        if setting is None:
             claimant.computed[key] = value
-        elif own != value:
+        elif setting != value:
             claimant.contradicting.add(key)
             message = (
-                f"{key} of {claimant.process.name} is {own!r}, but in the tree it is {value!r}"
+                f"{key} of {claimant.process.name} is {setting!r}, but in the tree it is {value!r}"
             )
             advice = "remove it: tfcompose writes it"
             if not claimant.takes_parameters:
@@ -217,14 +221,14 @@ class _Claims:
             self.claims.append(Claim(claimant.node.name, parent, child, off=claim.off))
         if not claimant.is_published(claim):
             return
-        other = edge or self.robot.parent_edge(child)
-        if other is None:
+        owned_edge = edge or self.robot.parent_edge(child)
+        if owned_edge is None:
             self._report_undeclared(claimant, claim, parent, child)
         else:
-            self._switch_off(claimant, claim, f"{parent} → {child}", other)
+            self._switch_off(claimant, claim, f"{parent} → {child}", owned_edge)
 
     def _compare_rate(self, claimant: Claimant, edge: Edge) -> None:
-        """Find a parameter by which the node sends its edge less often than is declared."""
+        """Report a parameter that makes the node publish the edge more slowly than declared."""
         preset = claimant.preset
         key, rate = preset.rate_in(claimant.params) if preset else ("", math.inf)
         if edge.rate and edge.is_slower(rate):
@@ -255,16 +259,18 @@ class _Claims:
                 finding("TF333", message, span, help="remove it, or name another owner")
             )
 
-    def _switch_off(self, claimant: Claimant, claim: ClaimSpec, name: str, other: Edge) -> None:
-        """Write the switch, or say that it cannot be written."""
+    def _switch_off(
+        self, claimant: Claimant, claim: ClaimSpec, name: str, owned_edge: Edge
+    ) -> None:
+        """Set the parameter that stops the publication, or report that this is not possible."""
         against = next(
             (key for key, off in claim.off.items() if claimant.params.get(key, off) != off), None
         )
         if against is not None and claimant.takes_parameters and not claimant.has(claim.on):
             value = claimant.params[against]
             message = (
-                f"{against} of {claimant.process.name} is {value!r}, and {other.owner} owns"
-                f" {other.name}"
+                f"{against} of {claimant.process.name} is {value!r}, and {owned_edge.owner} owns"
+                f" {owned_edge.name}"
             )
             advice = "remove it: tfcompose writes the switch"
             self.findings.append(
@@ -272,15 +278,21 @@ class _Claims:
             )
             return
         needed = any(
-            self._is_own(claimant, own) and set(own.off) & set(claim.off)
-            for own in claimant.claims
+            self._is_own(claimant, owned_claim) and set(owned_claim.off) & set(claim.off)
+            for owned_claim in claimant.claims
         )
         if claim.off and claimant.takes_parameters and not needed and not claimant.has(claim.on):
             claimant.computed |= claim.off
             return
-        owner = f"{other.owner} owns" if other.name == name else f"{other.owner} owns {other.name}"
-        message = f"{claimant.process.name} publishes {name} by default, which {other.owner} owns"
-        if other.name != name:
+        owner = (
+            f"{owned_edge.owner} owns"
+            if owned_edge.name == name
+            else f"{owned_edge.owner} owns {owned_edge.name}"
+        )
+        message = (
+            f"{claimant.process.name} publishes {name} by default, which {owned_edge.owner} owns"
+        )
+        if owned_edge.name != name:
             message = f"{claimant.process.name} publishes {name} by default, and {owner}"
         self.findings.append(
             finding(
@@ -346,21 +358,21 @@ class _Claims:
 
 @dataclass(slots=True)
 class Claimant:
-    """One node that may publish TF."""
+    """A node that may publish TF."""
 
     process: Process
     node: Node
     claims: tuple[ClaimSpec, ...]
     preset: NodePresetSpec | None
     roles: Roles
-    #: The parameters in the robot file.
+    #: Parameters from the robot file.
     params: dict[str, Any]
-    #: The parameters that tfcompose adds.
+    #: Parameters that tfcompose adds.
     computed: dict[str, Any] = field(default_factory=dict)
     contradicting: set[str] = field(default_factory=set)
 
     def settle(self) -> Node:
-        """Return the node with the parameters that tfcompose adds, if they reach it."""
+        """Return the node with the parameters that tfcompose adds, if the node receives them."""
         node = replace(self.node, contradicting=frozenset(self.contradicting))
         return replace(node, params=node.params | self.computed) if self.takes_parameters else node
 
@@ -369,7 +381,7 @@ class Claimant:
         return self.roles.fill(claim.parent), self.roles.fill(claim.child)
 
     def has(self, params: dict[str, Any]) -> bool:
-        """Return whether the user gave exactly these parameters."""
+        """Return whether the user set all these parameters to these values."""
         return bool(params) and all(self.params.get(key) == value for key, value in params.items())
 
     def is_published(self, claim: ClaimSpec) -> bool:
@@ -378,9 +390,9 @@ class Claimant:
 
     @property
     def takes_parameters(self) -> bool:
-        """Return whether parameters that tfcompose writes reach the node.
+        """Whether the node receives the parameters that tfcompose writes.
 
-        Launch files and shells have to pass them on.
+        A launch file or a shell would have to pass them on.
         """
         process = self.process
         if process.kind != "run":
@@ -396,11 +408,12 @@ _HOLE = re.compile(r"\{(\w+)\}")
 
 
 class Roles:
-    """A node's frames by role.
+    """Frames of the robot that play a role for a node, such as ``odom`` or ``base``.
 
-    In order: the ends of the edges that its process owns; frames with the names that the node
-    expects; for the base, the child of its odom frame, else the robot's base. A role without a
-    frame in the tree keeps the node's own name for it.
+    An edge that the node's process owns determines the roles of its two frames. Otherwise a role
+    belongs to the frame with the name that the node expects. The role ``base`` falls back to the
+    child of the odom frame, then to the robot's base. A role without a frame in the tree keeps the
+    node's default name.
     """
 
     def __init__(
@@ -431,13 +444,13 @@ class Roles:
         return role in self._bound
 
     def fill(self, template: str) -> str:
-        """Return a name with its roles replaced by names of the tree."""
+        """Return the name with each role replaced by the name of its frame."""
         return _HOLE.sub(
             lambda hole: self.frames.get(hole[1], self._usual.get(hole[1], hole[0])), template
         )
 
     def final(self, value: Any) -> Any:
-        """Return a parameter's value, with the frame's name on the live tree for a role."""
+        """Return a parameter's value. A role is replaced by the frame's name on /tf."""
         hole = _HOLE.fullmatch(value) if isinstance(value, str) else None
         if hole is None:
             return value
@@ -445,7 +458,7 @@ class Roles:
         return self._robot.final(frame) if frame else self._usual.get(hole[1], value)
 
     def _bind(self, edge: Edge, claims: tuple[ClaimSpec, ...]) -> None:
-        """Give an owned edge's ends the roles of the claim that fits it best."""
+        """Assign the roles of the best-fitting claim to the two frames of an owned edge."""
         fitting = [(self._fit(edge, claim), -index, claim) for index, claim in enumerate(claims)]
         fitting = [fit for fit in fitting if fit[0] >= 0]
         if not fitting:
@@ -457,9 +470,9 @@ class Roles:
                 self._bound.setdefault(hole[1], frame)
 
     def _fit(self, edge: Edge, claim: ClaimSpec) -> int:
-        """Return how well an edge fits a claim: by its ends' names, and by what hangs below.
+        """Return how well an edge fits a claim, by its frame names and by moving edges below it.
 
-        Negative if not at all.
+        Negative if the edge does not fit.
         """
         score = 0
         for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):

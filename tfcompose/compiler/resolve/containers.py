@@ -1,10 +1,10 @@
-"""Containers: programs of rclcpp_components, and the components that they load.
+"""Containers, programs of rclcpp_components, and the components that they load.
 
-Facts of rclcpp_components (ROS 2 Jazzy): ``component_container`` has one executor with one thread
-for all components, ``component_container_mt`` one with several threads;
-``component_container_isolated`` has one for each component, with several threads after
-``--use_multi_threaded_executor``. Each offers ``~/_container/load_node``. A component takes
-nothing from the container's command line, neither remappings nor parameters.
+In ROS 2 Jazzy, ``component_container`` has an executor with a single thread for all components.
+``component_container_mt`` has an executor with several threads. ``component_container_isolated``
+has an executor for each component, and gives it several threads with the option
+``--use_multi_threaded_executor``. Each program offers the service ``~/_container/load_node``. A
+component ignores remappings and parameters on the container's command line.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path
 
-#: The program, by isolation and executor, and its arguments.
+#: The program and its arguments, by isolation and executor.
 PROGRAMS = {
     ("shared", "single"): ("component_container", ()),
     ("shared", "multi"): ("component_container_mt", ()),
@@ -38,7 +38,7 @@ PROGRAMS = {
 
 
 def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Process:
-    """Return the process of a container; it is ready when it can load components."""
+    """Return the process of a container. It is ready when it can load components."""
     path: Path = ("containers", name)
     namespace = namespace_of(declared, spec.ros.namespace)
     node = Node(
@@ -62,9 +62,9 @@ def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Pr
 
 
 def component_process(process: Process, declared: StartedSpec, spec: RobotSpec) -> Process:
-    """Return the process as a component of the container that it names.
+    """Return the process as a component of its container.
 
-    It runs on the container's host and shares its ``required`` flag.
+    The component runs on the container's host and shares the container's ``required`` flag.
     """
     package, _, plugin = (declared.component or "").partition("/")
     loaded: dict[str, StartCondition] = {declared.container or "": "ready"}
@@ -82,8 +82,11 @@ def component_process(process: Process, declared: StartedSpec, spec: RobotSpec) 
 
 
 def check_components(draft: Draft) -> Iterator[Finding]:
-    """Yield findings about components: a missing container, and keys they cannot have."""
-    for process in draft.robot.processes[: len(draft.processes)]:  # without those of parts
+    """Yield findings about components.
+
+    A missing container, or keys that a component cannot have.
+    """
+    for process in draft.robot.processes[: len(draft.processes)]:  # only processes of this file
         if process.component:
             yield from _check_component(process, process.component, draft)
 
@@ -91,14 +94,16 @@ def check_components(draft: Draft) -> Iterator[Finding]:
 def _check_component(process: Process, component: Component, draft: Draft) -> Iterator[Finding]:
     spec = draft.spec
     path = entry_of(process, spec)
-    name, known = component.container, spec.containers
-    if name not in known and ("containers", name) not in draft.validated.broken:
+    name, containers = component.container, spec.containers
+    if name not in containers and ("containers", name) not in draft.validated.broken:
         otherwise = f"containers: {{{name}: {{}}}}"
         if any(name in section for section in (spec.processes, spec.sensors)):
             otherwise = (
-                f"name a container: {', '.join(known)}" if known else "containers: {NAME: {}}"
+                f"name a container: {', '.join(containers)}"
+                if containers
+                else "containers: {NAME: {}}"
             )
-        advice = did_you_mean(name, known, otherwise)
+        advice = did_you_mean(name, containers, otherwise)
         message = f"the container of {process.name} is {name}, which is not a container"
         yield finding("TF813", message, spec.span_of((*path, "container")), help=advice)
     if process.ready and process.ready.kind in {"exit", "log"}:
@@ -115,9 +120,9 @@ def _check_component(process: Process, component: Component, draft: Draft) -> It
         for key, value in values.items():
             if (wrong := _not_a_parameter(value)) and spec.spans.has((*path, where)):
                 exact: Path = (*path, where, *key.split("."))
-                at = exact if spec.spans.has(exact) else (*path, where)
+                place = exact if spec.spans.has(exact) else (*path, where)
                 yield finding(
-                    "TF103", f"{process.name}: {key} is {wrong}", spec.span_of(at), help=_KINDS
+                    "TF103", f"{process.name}: {key} is {wrong}", spec.span_of(place), help=_KINDS
                 )
 
 
@@ -125,7 +130,7 @@ _KINDS = "a parameter is true or false, a number, a string, or a list of one of 
 
 
 def _not_a_parameter(value: object) -> str:
-    """Return why ROS has no parameter of this kind; empty if it has."""
+    """Return why ROS has no parameter of this type; empty if ROS has."""
     if not isinstance(value, list):
         return (
             ""
@@ -141,7 +146,7 @@ def _not_a_parameter(value: object) -> str:
 
 
 def _kind_of(item: object) -> type | None:
-    """Return the kind of a parameter that an item of a list is; numbers are one kind."""
+    """Return the parameter type of an item of a list. All numbers count as the same type."""
     if isinstance(item, bool):
         return bool
     if isinstance(item, (int, float)):

@@ -1,7 +1,8 @@
-"""A robot during resolution: the file's contents, and the results of the passes so far.
+"""A robot during resolution: the content of the file, and the results of the passes so far.
 
-A pass is a function of one draft that yields findings. It reads the results of earlier passes and
-fills in its own. A helper that also returns a value does both: ``value = yield from helper(…)``.
+A pass is a function of a draft that yields findings. It reads the results of earlier passes and
+stores its own results in the draft. A helper that yields findings and also returns a value is
+called with ``value = yield from helper(…)``.
 """
 
 from __future__ import annotations
@@ -32,43 +33,43 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Collected:
-    """Data collected from all parts of a robot and their parts."""
+    """Data from all parts of a robot, and from the parts of these parts."""
 
     count: int = 0
-    #: The comments in the parts' files that silence findings.
+    #: Comments that silence findings, from the files of parts.
     allows: list[Allow] = field(default_factory=list)
-    #: A note for each use of a file as a part, by file. It names the part.
+    #: Notes by file. Each note names a part that uses the file.
     notes: dict[str, list[Note]] = field(default_factory=dict)
-    #: The sources of the robot files among the parts.
+    #: Sources of the parts that are robot files.
     sources: list[Source] = field(default_factory=list)
 
 
 @dataclass(slots=True)
 class Draft:
-    """One robot during resolution."""
+    """A robot during resolution."""
 
     validated: Validated
     library: Library
-    #: Return the text of a file. None: no file can be read.
+    #: Returns the text of a file. None if files cannot be read.
     read: Callable[[str], str] | None
-    #: None: meshes and packages are not looked up.
+    #: None if meshes and packages are not looked up.
     disk: Disk | None
-    #: Collected by the outermost robot from its parts and their parts.
+    #: Data that the outermost robot collects from its parts and from their parts.
     collected: Collected
     #: The robot that includes this one as a part.
     holder: Draft | None = None
-    #: Search paths of packages for its files.
+    #: Search paths for packages in this robot's file addresses.
     packages: Packages = field(init=False)
-    #: The entries (section, name) that were refused, and names that parts would have brought.
+    #: Rejected entries (section, name), and names that rejected parts would have defined.
     broken: set[tuple[str, str]] = field(init=False)
-    #: The processes that this file adds, without those of parts.
+    #: Processes from this file, without processes of parts.
     processes: list[Process] = field(default_factory=list)
     joined: list[Joined] = field(default_factory=list)
     frames: dict[str, Span] = field(default_factory=dict)
     joints: dict[str, Span] = field(default_factory=dict)
-    #: Poses are as written until ``solve_poses`` has run.
+    #: Until ``solve_poses`` has run, poses are those in the file.
     edges: list[Edge] = field(default_factory=list)
-    #: The keys of the edges that this file writes, by index.
+    #: The keys of edges from this file, by the edge's index.
     keys: dict[int, EdgeKeys] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=dict)
     sensors: list[MountedSensor] = field(default_factory=list)
@@ -86,18 +87,18 @@ class Draft:
 
     @property
     def spec(self) -> RobotSpec:
-        """The user's file, with the places of its values."""
+        """The content of the robot file, with the span of each value."""
         return self.validated.spec
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files of the robots that include this one, outermost first, then its own."""
+        """The files of the including robots, outermost first, and this robot's file."""
         above = self.holder.files if self.holder else ()
         return (*above, self.spec.spans.file)
 
     @property
     def all_processes(self) -> list[Process]:
-        """The processes of the robot and of its parts."""
+        """The processes of the robot and its parts."""
         of_parts = (process for part in self.joined for process in part.robot.processes)
         return [*self.processes, *of_parts]
 

@@ -1,7 +1,8 @@
-"""Edges as the user gave them: frames, links with a parent, joints and parts, with owners.
+"""Edges from the robot file: frames, links with a parent, joints and parts, with their owners.
 
-Poses and limits also keep their numbers as written, because rules about units and typing errors
-need them: a pose keeps a unit quaternion, which does not tell 90, 1.57 and 90 deg apart.
+The draft also keeps the numbers of poses and limits as the user wrote them, because rules about
+units and typing errors need the original numbers. After conversion to a unit quaternion, 90, 1.57
+and 90 deg look the same.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from tfcompose.foundation.units import WithUnit, quantity
 from tfcompose.model.robot import (
     FREE,
     JOINTS,
+    MOVING,
     STATIC,
     Edge,
     Joint,
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 
 
 def add_frames(draft: Draft) -> Iterator[Finding]:
-    """Take the bare frames; one without a parent is declared a root."""
+    """Add the entries of ``frames`` to the draft. An entry without a parent declares a root."""
     for name, frame in draft.spec.frames.items():
         path = ("frames", name)
         draft.frames.setdefault(name, draft.spec.key_span(path))
@@ -46,7 +48,7 @@ def add_frames(draft: Draft) -> Iterator[Finding]:
 
 
 def add_links(draft: Draft) -> Iterator[Finding]:
-    """Take the bodies; one with a parent has a fixed edge."""
+    """Add the bodies to the draft. A body with a parent also adds a fixed edge."""
     bodies = Bodies(draft.spec, draft.packages)
     for name, link in draft.spec.links.items():
         path = ("links", name)
@@ -57,7 +59,7 @@ def add_links(draft: Draft) -> Iterator[Finding]:
 
 
 def add_joints(draft: Draft) -> Iterator[Finding]:
-    """Take the edges between bodies."""
+    """Add the joints' edges to the draft."""
     for name, joint in draft.spec.joints.items():
         yield from _idle_joint_keys(name, joint, draft.spec)
         yield from add_edge(draft, ("joints", name), joint.child, joint, joint_name=name)
@@ -73,9 +75,9 @@ def add_edge(  # noqa: PLR0913 (an edge has that many parts)
     sensor: str | None = None,
     owner: str | None = None,
 ) -> Iterator[Finding]:
-    """Take the edge written at a place; for a sensor or part it is the mount.
+    """Add the edge of an entry to the draft; for a sensor or a part, the edge of its mount.
 
-    Without a parent there is no edge.
+    An entry without a parent adds no edge.
     """
     spec = draft.spec
     if keys.parent is None:
@@ -121,9 +123,9 @@ def add_edge(  # noqa: PLR0913 (an edge has that many parts)
 
 
 def add_joint_name(draft: Draft, name: str | None, path: Path) -> Finds[Span | None]:
-    """Take the joint name of an entry: the entry's name, or its key ``joint``.
+    """Add the joint name of an entry, which is the entry's name or its key ``joint``.
 
-    Return its place, None if there is no name.
+    Return the span of the name, None without a name.
     """
     if not name:
         return None
@@ -138,7 +140,7 @@ def add_joint_name(draft: Draft, name: str | None, path: Path) -> Finds[Span | N
 
 
 _MOVING = "revolute, continuous or prismatic"
-#: Descriptions of motion for types of joints that describe none.
+#: Keys that describe a motion, by the types of joints that do not use these keys.
 _IDLE = {
     "fixed": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),
     "floating": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),
@@ -147,7 +149,7 @@ _IDLE = {
 
 
 def _joint_of(path: Path, declared: JointSpec, spec: RobotSpec) -> Joint | None:
-    """Return the joint with a unit axis, or None where it is fixed."""
+    """Return the joint with a unit axis, None for a fixed joint."""
     kind: Any = declared.type
     if kind == "fixed":
         return None
@@ -174,8 +176,14 @@ def _joint_of(path: Path, declared: JointSpec, spec: RobotSpec) -> Joint | None:
 
 
 def _idle_joint_keys(name: str, joint: JointSpec, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield a finding where a joint has keys that joints of its type do not use."""
+    """Yield a finding for each key of a joint that joints of its type do not use."""
     path: Path = ("joints", name)
+    if "offset" in joint.model_fields_set and joint.type not in MOVING:
+        message = f"the joint {name} is {joint.type}, and has no zero that an offset could correct"
+        advice = f"correct its mount instead: xyz and rpy, or tfcompose nudge {joint.child}"
+        if joint.type in FREE:
+            advice = f"correct the pose in {joint.owner or 'the process that publishes it'}"
+        yield finding("TF739", message, spec.key_span((*path, "offset")), help=advice)
     unused = joint.model_fields_set & {*_IDLE.get(joint.type, ())}
     advice = (
         "leave it out" if joint.type in FREE else f"leave it out; if {name} moves, type: {_MOVING}"
@@ -203,12 +211,12 @@ _MAPPINGS = {
 
 
 def source_numbers(spec: RobotSpec) -> tuple[SourceNumbers, ...]:
-    """Return the numbers of every pose and joint limit of the spec."""
+    """Return the numbers of all poses and joint limits in the file."""
     return tuple(
-        found
+        span
         for section in _SECTIONS
         for name, entry in getattr(spec, section).items()
-        for found in _of(entry, (section, name), spec.spans)
+        for span in _of(entry, (section, name), spec.spans)
     )
 
 
@@ -224,6 +232,8 @@ def _of(entry: Spec, path: Path, spans: Spans) -> Iterator[SourceNumbers]:
             numbers = {step: number for step, number in steps.items() if number is not None}
             if numbers:
                 yield _numbers(numbers, here, spans)
+        elif key == "offset" and isinstance(entry, JointSpec):
+            yield _numbers({key: value}, here, spans)
         elif isinstance(value, Spec):
             yield from _of(value, here, spans)
         elif isinstance(value, (tuple, dict)) and key != "params":
@@ -231,7 +241,7 @@ def _of(entry: Spec, path: Path, spans: Spans) -> Iterator[SourceNumbers]:
 
 
 def _inside(value: Any, path: Path, spans: Spans) -> Iterator[SourceNumbers]:
-    """Yield the numbers in a list or mapping; one item may stand for a list of it."""
+    """Yield the numbers in a list or mapping. A list may be written as its only item."""
     for step, item in value.items() if isinstance(value, dict) else enumerate(value):
         if isinstance(item, Spec):
             here = (*path, step)
@@ -251,8 +261,8 @@ def _numbers(numbers: dict[Any, float], path: Path, spans: Spans) -> SourceNumbe
     )
 
 
-# Edits of the file that give an entry the optical rotation of REP-103, in whichever way a rotation
-# is written.
+# Edits of the robot file that give an entry the optical rotation of REP-103. The edits keep the
+# form in which the file states the rotation.
 
 _OPTICAL: dict[str, Any] = {
     "rpy": ["-90 deg", "0", "-90 deg"],
@@ -263,13 +273,16 @@ _OPTICAL: dict[str, Any] = {
 }
 _RPY = "rpy: [-90 deg, 0, -90 deg]"
 
-#: With these the written pose is not that of the frame in its parent.
+#: Keys with which the pose in the file is not the pose of the frame in its parent.
 _OTHER_POSES = ("relative_to", "place", "calibration")
 _OPTICAL_IN = ("frames", "links", "joints")
 
 
 def optical_edits(path: Path, keys: EdgeKeys, spans: Spans) -> tuple[Edit, ...]:
-    """Return edits that rotate the frame of the entry at ``path``, none if others would move."""
+    """Return edits that give the frame of the entry at ``path`` an optical rotation.
+
+    Empty if the edits would also move other frames.
+    """
     if (
         path[0] not in _OPTICAL_IN
         or spans.span_of(path).file != spans.span_of((*path, "parent")).file
@@ -288,23 +301,23 @@ def optical_edits(path: Path, keys: EdgeKeys, spans: Spans) -> tuple[Edit, ...]:
 
 
 def _insertion(path: Path, spans: Spans) -> Edit:
-    """Return the edit that writes the rotation after the parent."""
+    """Return the edit that inserts the rotation after the parent."""
     parent, entry = spans.span_of((*path, "parent")), spans.places.nearest(path)
     first = min(
         (key.span for key in entry.keys.values()), key=lambda span: (span.line, span.column)
     )
     if (entry.span.line, entry.span.column) < (first.line, first.column):  # in braces
-        at = (parent.end_line, parent.end_column)
-        return Edit(Span(parent.file, *at, *at), f", {_RPY}")
-    at = (parent.end_line + 1, 1)
+        position = (parent.end_line, parent.end_column)
+        return Edit(Span(parent.file, *position, *position), f", {_RPY}")
+    position = (parent.end_line + 1, 1)
     indent = " " * (spans.key_span((*path, "parent")).column - 1)
-    return Edit(Span(parent.file, *at, *at), f"{indent}{_RPY}\n")
+    return Edit(Span(parent.file, *position, *position), f"{indent}{_RPY}\n")
 
 
 def _replacement_edits(old: Any, new: Any, path: Path, spans: Spans) -> list[Edit]:
-    """Return the edits that put each scalar of ``new`` in the place of that of ``old``.
+    """Return the edits that replace each scalar of ``old`` by its counterpart in ``new``.
 
-    None where the forms differ.
+    Empty if ``old`` and ``new`` have different structures.
     """
     if isinstance(new, dict):
         return [
@@ -326,10 +339,10 @@ def _replacement_edits(old: Any, new: Any, path: Path, spans: Spans) -> list[Edi
 
 
 def _is_alone(span: Span, path: Path, spans: Spans) -> bool:
-    """Whether what is at the span belongs to this entry alone, and to no alias of it."""
-    others = (
-        other
-        for other, location in spans.places.walk()
-        if other[: len(path)] != path and location.span == span
+    """Return whether the text at the span belongs only to this entry, not to an alias."""
+    aliases = (
+        alias_path
+        for alias_path, location in spans.places.walk()
+        if alias_path[: len(path)] != path and location.span == span
     )
-    return next(others, None) is None
+    return next(aliases, None) is None

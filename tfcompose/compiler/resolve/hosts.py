@@ -1,4 +1,4 @@
-"""The computers of a robot, and the places where processes name theirs."""
+"""The computers of a robot, and the places where processes name their computer."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def hosts_of(spec: RobotSpec) -> dict[str, Host]:
     """Return the computers that the file declares, by name.
 
-    The name is also the ssh address unless the file gives another.
+    The name is also the ssh address, unless the file sets another address.
     """
     return {
         name: Host(
@@ -32,15 +32,15 @@ def hosts_of(spec: RobotSpec) -> dict[str, Host]:
 
 
 def entry_of(process: Process, spec: RobotSpec) -> Path:
-    """Return the path of the entry that has the keys of a process."""
+    """Return the path of the entry with the keys of the process."""
     sections = (("containers", process.name), ("processes", process.name))
     return next(filter(spec.spans.has, sections), ("sensors", process.name, "driver"))
 
 
 def with_host_place(process: Process, spec: RobotSpec) -> Process:
-    """Return the process with the place of its host.
+    """Return the process with the span of its host.
 
-    A component has none: it runs on its container's host.
+    A component has no host of its own: it runs on its container's host.
     """
     host_at = spec.spans.exact_span((*entry_of(process, spec), "host"))
     return replace(process, host_at=host_at)

@@ -1,8 +1,9 @@
-"""Robots side by side: frame prefixes, namespaced topics, and names of processes.
+"""Isolation of robots: frame prefixes, topics below a namespace, and names of processes.
 
-A prefix is put verbatim in front of every frame that is not shared, like robot_state_publisher's
-``frame_prefix``. Topics are isolated as Clearpath does it: /tf and /tf_static are absolute, so a
-namespace does not move them. They are remapped below the namespace for all processes.
+A prefix is prepended unchanged to the name of every frame that robots do not share, like
+robot_state_publisher's ``frame_prefix``. Topics are isolated as in Clearpath's software. /tf and
+/tf_static are absolute names, so a namespace does not move them. Remappings move them below the
+namespace for all processes.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def settings_of(ros: RosSpec) -> RosSettings:
-    """Return the settings of all processes, with the frame prefix that the isolation implies."""
+    """Return the settings of all processes, with the frame prefix that ``isolate`` implies."""
     namespace = ros.namespace.strip("/")
     prefix = ros.frame_prefix
     if not prefix and ros.isolate in {"frames", "both"} and namespace:
@@ -38,16 +39,16 @@ def settings_of(ros: RosSpec) -> RosSettings:
 
 
 def topics_below(namespace: str, isolate: str) -> dict[str, str]:
-    """Return the remapped TF topics.
+    """Return the remappings of the TF topics.
 
-    They are below the namespace if topics are isolated and it is not empty.
+    The topics are moved below ``namespace`` if topics are isolated and it is not empty.
     """
     moves = isolate in {"topics", "both"} and namespace
     return {topic: f"/{namespace}{topic}" for topic in GLOBAL} if moves else {}
 
 
 def isolate(draft: Draft) -> Iterator[Finding]:
-    """Move the topics of all processes, and fill in the frames and files that they name."""
+    """Remap the topics of all processes, and insert the frames and files that processes name."""
     robot, spec = draft.robot, draft.spec
     yield from _faults(robot, spec)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
@@ -71,24 +72,24 @@ def isolate(draft: Draft) -> Iterator[Finding]:
 def _remapped(
     process: Process, rules: Mapping[str, str], robot_namespace: str, *, owns: bool
 ) -> Process:
-    """Return the process with the rules around the robot, which come before its own.
+    """Return the process with remapping ``rules``, which take precedence over its own rules.
 
-    TF topics move for every process at once, others for those that are ROS nodes.
+    Rules for TF topics apply to every process. Other rules apply only to ROS nodes.
     """
     namespace = robot_namespace if process.namespace is None else process.namespace
     names = {old: full_name(namespace, old) for old in rules}
-    # Whoever watches TF knows its topics by their full names.
+    # Nodes that observe TF use the full names of its topics.
     rules_of_tf = {
         names[old]: full_name(robot_namespace, new)
         for old, new in rules.items()
         if names[old] in GLOBAL
     }
-    others = {old: new for old, new in rules.items() if names[old] not in GLOBAL}
-    outer = rules_of_tf | (others if process.is_node(owns=owns) else {})
+    local_rules = {old: new for old, new in rules.items() if names[old] not in GLOBAL}
+    outer = rules_of_tf | (local_rules if process.is_node(owns=owns) else {})
     remap = outer | {old: new for old, new in process.remap.items() if old not in outer}
     ready = process.ready
     if ready and ready.kind == "topic":
-        moved = {names[old]: full_name(namespace, new) for old, new in others.items()}
+        moved = {names[old]: full_name(namespace, new) for old, new in local_rules.items()}
         ready = replace(ready, text=moved.get(ready.text, ready.text))
     return replace(process, remap=remap, ready=ready)
 
@@ -102,7 +103,7 @@ def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
         advice = "ros: {namespace: robot1}"
         yield finding("TF304", message, spec.span_of(("ros", "isolate")), help=advice)
     for index, frame in enumerate(ros.shared_frames):
-        if frame not in robot.frames and not robot.excuses(frame):
+        if frame not in robot.frames and not robot.tolerates(frame):
             message = f"shared_frames: unknown frame {frame}"
             advice = did_you_mean(frame, robot.frames, "remove it")
             span = spec.span_of(("ros", "shared_frames", index))
@@ -111,10 +112,10 @@ def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
 
 @dataclass(slots=True)
 class _ProcessFiller:
-    """Fill in the frames and files that processes name."""
+    """Inserts the frames and files that processes name."""
 
     draft: Draft
-    #: Findings about names that cannot be filled in.
+    #: Findings about names that cannot be inserted.
     findings: list[Finding] = field(default_factory=list)
 
     def fill(self, process: Process) -> Process:
@@ -159,7 +160,7 @@ class _ProcessFiller:
         return self._frame(name, path) if what == "frame" else self._file(name, path)
 
     def _frame(self, frame: str, path: Path) -> str:
-        if frame not in self.draft.robot.frames and not self.draft.robot.excuses(frame):
+        if frame not in self.draft.robot.frames and not self.draft.robot.tolerates(frame):
             advice = did_you_mean(frame, self.draft.robot.frames)
             span = self.draft.spec.span_of(path)
             self.findings.append(
@@ -193,9 +194,9 @@ class _ProcessFiller:
         return f"${{file:{place}}}"
 
     def _folder(self, cwd: str | None, path: Path) -> str | None:
-        """Return the folder that a process runs in.
+        """Return the working directory of a process.
 
-        A relative one is beside the file that names it.
+        A relative path starts at the folder of the file that contains it.
         """
         if cwd is None or cwd.startswith(("/", "${")):
             return self._fill(cwd, path)  # type: ignore[no-any-return]
@@ -209,7 +210,11 @@ class _ProcessFiller:
         return f"${{file:{place}}}"
 
     def _check_paths(self, process: Process, node: Node) -> None:
-        """Find parameters with a launch-time path where the launcher cannot name the node."""
+        """Report parameters with paths known only at launch time, if the launcher cannot set them.
+
+        The launcher can set a parameter of a component, or of a package's program with a single
+        node.
+        """
         can = process.component or (
             process.kind == "run" and process.package is not None and len(process.nodes) == 1
         )

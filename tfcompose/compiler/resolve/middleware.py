@@ -1,4 +1,4 @@
-"""The robot's middleware: Zenoh's router among its processes, and findings about conflicts."""
+"""The robot's middleware: adds Zenoh's router to the processes, and reports conflicts."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.robot import RobotSpec
 
 _RMW = "RMW_IMPLEMENTATION"
-#: The router does not flush this line unless it writes to a terminal.
+#: The log line of a ready router. The router flushes it only if it writes to a terminal.
 _READY = Ready("log", ROUTER_LISTENS)
-#: The router's program, as a package's.
+#: The router's package and executable.
 _PROGRAM = ("rmw_zenoh_cpp", "rmw_zenohd")
 
 
 def is_own_router(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> bool:
-    """Return whether a process is the router that needs no declaration.
+    """Return whether ``name`` is the Zenoh router that tfcompose adds.
 
-    The entry under its name adds keys to it.
+    A robot file may have an entry with this name that sets keys such as ``host``, but not a
+    program.
     """
     return spec.ros.rmw == "zenoh" and name == ROUTER and not says_how(declared)
 
 
 def own_router(spec: RobotSpec) -> list[Process]:
-    """Return the Zenoh router's process, unless the robot has one or needs none."""
+    """Return the process of the Zenoh router, unless the robot has a router or needs none."""
     declared = spec.processes.get(ROUTER)
     runs_it = any(
         process.run and (process.run.package, process.run.executable) == _PROGRAM
@@ -64,9 +65,9 @@ def own_router(spec: RobotSpec) -> list[Process]:
 
 
 def _with_router(robot: Robot) -> Robot:
-    """Return the robot whose processes start once Zenoh's router listens.
+    """Return the robot with processes that start only after the Zenoh router listens.
 
-    The router knows where.
+    If the router's listening address is not the default, its environment sets the address.
     """
     routers = _routers(robot)
     if robot.ros.rmw != "zenoh" or not routers:
@@ -76,7 +77,7 @@ def _with_router(robot: Robot) -> Robot:
         if process.name == router.name and process.kind == "run":
             env = router_variables(robot.ros) | process.env
             if process.ready is None:
-                process = replace(process, ready=_READY, emulate_tty=True)  # noqa: PLW2901 (as it is started)
+                process = replace(process, ready=_READY, emulate_tty=True)  # noqa: PLW2901
             processes.append(replace(process, env=env))
         elif (
             process.kind == "external"
@@ -98,14 +99,17 @@ def _routers(robot: Robot) -> list[Process]:
 
 
 def use_middleware(draft: Draft) -> Iterator[Finding]:
-    """Let processes wait for Zenoh's router; those of a part wait in its holder."""
+    """Make processes wait for the Zenoh router.
+
+    A part is skipped, because its parent does this.
+    """
     if draft.holder is None:
         yield from _faults(draft.robot, draft.spec)
         draft.robot = _with_router(draft.robot)
 
 
 def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield what the middleware cannot do, conflicts, and hosts that do not reach the router."""
+    """Yield findings about unsupported settings and conflicts, and about unreachable routers."""
     ros = robot.ros
     if spec.ros.router and ros.rmw != "zenoh":
         advice = "ros: {rmw: zenoh}, or remove router"
@@ -124,14 +128,14 @@ def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
 
 
 def _unsupported_settings(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
-    ros, at = robot.ros, spec.span_of(("ros", "rmw"))
+    ros, span = robot.ros, spec.span_of(("ros", "rmw"))
     if ros.rmw == "fastdds":
         return
     if robot.guard.mode == "strict" and robot.guard.fence == "partition":
         message = (
             f"guard: {{fence: partition}} needs Fast DDS, and rmw: {ros.rmw} has no partitions"
         )
-        place = spec.span_of(("guard", "fence")) if spec.spans.has(("guard", "fence")) else at
+        place = spec.span_of(("guard", "fence")) if spec.spans.has(("guard", "fence")) else span
         yield finding(
             "TF870", message, place, help="remove fence: the strict guard then uses remapping"
         )
@@ -142,18 +146,18 @@ def _unsupported_settings(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
 
 
 def _disagreeing(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield a finding for each process that is given another middleware.
+    """Yield a finding for each process whose environment sets another middleware.
 
-    It finds none of the others.
+    Such a process cannot discover the other processes.
     """
-    wanted = IMPLEMENTATIONS[robot.ros.rmw] if robot.ros.rmw else ""
+    implementation = IMPLEMENTATIONS[robot.ros.rmw] if robot.ros.rmw else ""
     for process in robot.processes:
-        own = process.env.get(_RMW)
-        if own is None or own == wanted:
+        rmw = process.env.get(_RMW)
+        if rmw is None or rmw == implementation:
             continue
         path = (*entry_of(process, spec), "env", _RMW)
         span = spec.spans.exact_span(path) or process.span
-        message = f"{process.name} gets {_RMW}={own}, but the robot has rmw: {robot.ros.rmw}"
+        message = f"{process.name} gets {_RMW}={rmw}, but the robot has rmw: {robot.ros.rmw}"
         notes = [Note("set here", spec.span_of(("ros", "rmw")))]
         advice = (
             f"remove {_RMW} from its env: {process.name} cannot find the other processes with it"

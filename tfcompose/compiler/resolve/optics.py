@@ -1,4 +1,4 @@
-"""Optics of a sensor's streams: the preset's values, overridden by the user's."""
+"""Optics of a sensor's streams: values from the preset, overridden by the robot file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.optics import OpticsSourceSpec
     from tfcompose.spec.language.robot import RobotSpec
 
-#: Keys of the language that ``Optics`` has under the same name, but for those that are found here.
+#: Keys that ``Optics`` has under the same name, without keys that this module computes.
 _KEYS = tuple(
     field.name
     for field in fields(Optics)
@@ -34,8 +34,8 @@ _KINDS: dict[str, OpticsKind] = {
     "radar": "radar",
     "ultrasonic": "ultrasonic",
 }
-#: Keys that replace another key of the same stream: if the user sets one, the preset's other key
-#: is ignored.
+#: Keys that replace other keys of the same stream. If the robot file sets such a key, the other
+#: keys of the preset are ignored.
 _REPLACES = {"elevations": ("channels", "vertical"), "channels": ("elevations",)}
 
 
@@ -44,14 +44,14 @@ def optics_of(
 ) -> Finds[tuple[Optics, ...]]:
     """Return the optics of the sensor's streams in ``frames``.
 
-    ``frames`` are the sensor's, including its mount, before any renaming.
+    ``frames`` are the sensor's frames, including its mount, before any renaming.
     """
     declared, preset = sensor.spec.optics, sensor.preset
     made = []
     for stream in dict.fromkeys((*preset.optics, *declared)):
-        base, own = preset.optics.get(stream), declared.get(stream)
+        base, override = preset.optics.get(stream), declared.get(stream)
         path = ("sensors", sensor.name, "optics", stream)
-        pattern = (own.frame if own else None) or (base.frame if base else None)
+        pattern = (override.frame if override else None) or (base.frame if base else None)
         if pattern is None:
             advice = f"frame: {sensor.fill_name(preset.mount)}; {sensor.spec.preset} has "
             advice += f"the streams {', '.join(preset.optics)}" if preset.optics else "no streams"
@@ -60,46 +60,51 @@ def optics_of(
             )
             continue
         frame = sensor.fill_name(pattern)
-        if own and own.frame and frame not in frames:
+        if override and override.frame and frame not in frames:
             advice = did_you_mean(frame, frames, f"its frames: {', '.join(frames)}")
             span = spec.span_of((*path, "frame"))
             yield finding("TF203", f"{sensor.name} has no frame {frame}", span, help=advice)
             continue
-        if frame not in frames or not (own or base is None or sensor.holds(base.when)):
+        if frame not in frames or not (override or base is None or sensor.holds(base.when)):
             continue
         kind = (
-            (own.kind if own else None) or (base.kind if base else None) or _KINDS.get(preset.kind)
+            (override.kind if override else None)
+            or (base.kind if base else None)
+            or _KINDS.get(preset.kind)
         )
         if kind is None:
             advice = "kind: camera, lidar, radar or ultrasonic"
             message = f"{preset.kind} sees nothing: the stream {stream} has no kind"
             yield finding("TF102", message, spec.key_span(path), help=advice)
             continue
-        span = spec.key_span(path) if own else spec.key_span(path[:2])
-        values, sources = _merge_optics(base, own, str(spec.key_span(path)))
+        span = spec.key_span(path) if override else spec.key_span(path[:2])
+        values, sources = _merge_optics(base, override, str(spec.key_span(path)))
         values.setdefault("active", kind != "camera")
         made.append(Optics(stream, renamed(frame), kind, span, sources=tuple(sources), **values))
     return tuple(made)
 
 
 def _merge_optics(
-    base: OpticsSpec | None, own: OpticsSpec | None, where: str
+    base: OpticsSpec | None, override: OpticsSpec | None, where: str
 ) -> tuple[dict[str, Any], Iterable[OpticsSource]]:
-    """Return the values of the keys that anybody gives, and where they are from."""
-    values, declared = _values(base), _values(own)
-    replaced = {*declared, *(other for key in declared for other in _REPLACES.get(key, ()))}
+    """Return the values of all keys that are set, and their sources."""
+    values, declared = _values(base), _values(override)
+    replaced = {
+        *declared,
+        *(replaced_key for key in declared for replaced_key in _REPLACES.get(key, ())),
+    }
     values = {key: value for key, value in values.items() if key not in replaced} | declared
     elevations = values.get("elevations")
     if elevations:
         values.setdefault("channels", len(elevations))
         values.setdefault("vertical", (min(elevations), max(elevations)))
     sources = []
-    for spec, outdated in ((base, replaced), (own, set[str]())):
+    for spec, outdated in ((base, replaced), (override, set[str]())):
         for source in _sources(spec):
             keys = tuple(key for key in source.of if key not in outdated)
             if keys:
                 sources.append(OpticsSource(keys, source.where, source.quality))
-    sourced = {key for source in _sources(own) for key in source.of}
+    sourced = {key for source in _sources(override) for key in source.of}
     unsourced = tuple(key for key in declared if key not in sourced)
     if unsourced:
         sources.append(OpticsSource(unsourced, where, "robot file"))

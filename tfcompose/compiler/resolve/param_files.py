@@ -1,4 +1,4 @@
-"""Parameter files that a process names, overridden by its inline parameters."""
+"""Parameter files of processes, overridden by parameters in the robot file."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 
 def read_param_files(draft: Draft) -> Iterator[Finding]:
-    """Override the parameters in files with those of processes, for parts separately.
+    """Read the parameter files of all processes, and override them with inline parameters.
 
-    A file may be in a package.
+    A file may be in a ROS package. Each part reads its own files.
     """
     robot, work = draft.robot, _ParamFiles(draft)
     names = {
@@ -47,17 +47,24 @@ class _ParamFiles:
     draft: Draft
     findings: list[Finding] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
-    _known: dict[str, ParamsFile] = field(default_factory=dict)
+    _files: dict[str, ParamsFile] = field(default_factory=dict)
 
     def process(self, process: Process) -> Process:
-        others: dict[str, Any] = {}
-        nodes = tuple(self._node(node, process, others) for node in process.ros_nodes)
-        own = {node.name.lstrip("/") for node in nodes}
-        others = {name: params for name, params in others.items() if name.lstrip("/") not in own}
-        return replace(process, ros_nodes=nodes, other_params=others)
+        other_params: dict[str, Any] = {}
+        nodes = tuple(self._node(node, process, other_params) for node in process.ros_nodes)
+        node_names = {node.name.lstrip("/") for node in nodes}
+        other_params = {
+            name: params
+            for name, params in other_params.items()
+            if name.lstrip("/") not in node_names
+        }
+        return replace(process, ros_nodes=nodes, other_params=other_params)
 
-    def _node(self, node: Node, process: Process, others: dict[str, Any]) -> Node:
-        """Return the node with its parameters; ``others`` takes what its files hold besides."""
+    def _node(self, node: Node, process: Process, other_params: dict[str, Any]) -> Node:
+        """Return the node with its parameters.
+
+        Other sections of its files are added to ``other_params``.
+        """
         named: dict[str, Span] = {}
         sections: dict[str, dict[str, Any]] = {}
         places: dict[str, tuple[Span, ...]] = {}
@@ -74,13 +81,13 @@ class _ParamFiles:
             if not for_node and not content.findings and not process.loads:
                 without.append(_nothing(path, span, node, process, content.nodes))
         if len(without) == len(files):
-            # A file that all nodes are given need not have something for each.
+            # A file for all nodes need not contain a section for each node.
             self.findings += without
         params_here: dict[str, Any] = {}
         for name, params in sections.items():
             if matches(name, node.name):
                 params_here = _merge_params(params_here, params)
-            others[name] = _merge_params(others.get(name, {}), _words(params))
+            other_params[name] = _merge_params(other_params.get(name, {}), _words(params))
         places |= {
             key: (named[value.span.file], value.span)
             for key, value in params_here.items()
@@ -90,7 +97,7 @@ class _ParamFiles:
         return replace(node, params=_merge_params(_words(params_here), inline), places=places)
 
     def _inline(self, node: Node, places: dict[str, tuple[Span, ...]]) -> dict[str, Any]:
-        """Return the parameters of the robot file itself; ``places`` takes where they are."""
+        """Return the parameters from the robot file, and add their spans to ``places``."""
         has_files = names_files(node.params)
         for key in node.params:
             path = (*node.path, "params", key)
@@ -103,7 +110,7 @@ class _ParamFiles:
     def _load_files(
         self, node: Node, named: dict[str, Span]
     ) -> Iterator[tuple[str, Span, ParamsFile]]:
-        """Yield the files that a node names; ``named`` takes where each is named."""
+        """Yield the files that a node names, and add the span of each name to ``named``."""
         for file, span in self._files_of(node):
             if not isinstance(file, str) or not file:
                 self.findings.append(
@@ -115,7 +122,7 @@ class _ParamFiles:
                 yield path, span, content
 
     def _files_of(self, node: Node) -> list[tuple[Any, Span]]:
-        """Return the parameter files that a node names, each with the place of its name."""
+        """Return the parameter files that a node names, with the span of each name."""
         if not names_files(node.params):
             return []
         named, path = node.params[FILE_KEY], (*node.path, "params", FILE_KEY)
@@ -127,15 +134,15 @@ class _ParamFiles:
         return [(file, self.draft.spec.span_of(path)) for file, path in paths]
 
     def _load(self, file: str, span: Span) -> tuple[str, ParamsFile] | None:
-        """Return the path of a file that is named here, and what it holds."""
+        """Return the path and the content of the parameter file."""
         call = OF_FILES.fullmatch(file)
         try:
             path = self.draft.packages.path_of(call[2] if call else file, span)
         except RejectedError as error:
             self.findings += error.findings
             return None
-        if path in self._known:
-            return path, self._known[path]
+        if path in self._files:
+            return path, self._files[path]
         note = Note("named here", span)
         if self.draft.read is None:
             self.findings.append(finding("TF001", f"{path}: files cannot be read here", span))
@@ -152,26 +159,26 @@ class _ParamFiles:
             replace(finding, notes=(*finding.notes, note)) for finding in loaded.findings
         ]
         self.digests[path] = hashlib.sha256(text.encode()).hexdigest()
-        self._known[path] = loaded
+        self._files[path] = loaded
         return path, loaded
 
 
-#: The section of a parameter file that means every node.
+#: The section of a parameter file that applies to every node.
 _ANY = "/**"
 
 
 def _add_sections(sections: dict[str, dict[str, Any]], content: ParamsFile) -> None:
-    """Add a file's sections as rcl does: each name keeps the place where it came first."""
+    """Add the sections of a file, as rcl does: a repeated section keeps its first position."""
     for node in content.nodes:
         sections[node.name] = _merge_params(sections.get(node.name, {}), node.params)
 
 
 def _nothing(
-    path: str, span: Span, node: Node, process: Process, there: Sequence[NodeParams]
+    path: str, span: Span, node: Node, process: Process, sections: Sequence[NodeParams]
 ) -> Finding:
-    names = [section.name for section in there]
+    names = [section.name for section in sections]
     near = nearest(node.name.rpartition("/")[2], [name.rpartition("/")[2] for name in names])
-    likely = next((section for section in there if near and section.name.endswith(near)), None)
+    likely = next((section for section in sections if near and section.name.endswith(near)), None)
     notes = [Note(f"it has {likely.name}", likely.span)] if likely else []
     advice = (
         f"call it {node.name} there (/** means any node), or give the process that node: it has"
@@ -182,9 +189,9 @@ def _nothing(
 
 
 def matches(pattern: str, name: str) -> bool:
-    """Return whether a pattern of a parameter file matches the node.
+    """Return whether a pattern of a parameter file matches the node's name.
 
-    * matches one part of a name, ** any number of them.
+    ``*`` matches a single part of the name, ``**`` any number of parts.
     """
     return _matches(pattern.strip("/").split("/"), name.strip("/").split("/"))
 
@@ -198,7 +205,7 @@ def _matches(pattern: list[str], parts: list[str]) -> bool:
 
 
 def _merge_params(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """Return parameters with others laid over them; mappings merge."""
+    """Return ``below`` overridden by ``above``. Mappings are merged."""
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)

@@ -1,4 +1,4 @@
-"""One part: its entry in the holder's file, and its contents under the holder's names."""
+"""A part: its entry in the including robot file, and its content under the names there."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.robot import PartSpec, RobotSpec
     from tfcompose.spec.load import Path, Source
 
-#: Valid prefixes of names that are looked up.
+#: Valid prefixes.
 _PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")
 
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """A part as its holder sees it."""
+    """A part as the including robot sees it."""
 
     name: str
     declared: PartSpec
     robot: Robot
-    #: The frame that is attached to the holder; None if there is no single root.
+    #: The frame to attach to the including robot; None unless there is a single root.
     root: str | None
-    #: Frames of the part that are also the holder's.
+    #: Frames of the part that are also frames of the including robot.
     shared: frozenset[str]
 
 
 @dataclass(slots=True)
 class PartEntry:
-    """One entry of ``parts`` during resolution."""
+    """An entry of ``parts`` during resolution."""
 
     name: str
     declared: PartSpec
@@ -49,19 +49,19 @@ class PartEntry:
 
     @property
     def path(self) -> Path:
-        """Its path in the robot file."""
+        """The path of the entry in the robot file."""
         return ("parts", self.name)
 
     @property
     def span(self) -> Span:
-        """The place of its name."""
+        """The span of the part's name."""
         return self.spec.key_span(self.path)
 
     @property
     def prefix(self) -> str:
-        """The prefix of its frames.
+        """The prefix of the part's frames.
 
-        As given, or the namespace if that isolates frames.
+        This is the declared prefix, otherwise the namespace if ``isolate`` applies to frames.
         """
         if self.declared.prefix is not None:
             return self.declared.prefix
@@ -70,10 +70,7 @@ class PartEntry:
 
     @property
     def isolate(self) -> str:
-        """Its isolation.
-
-        Frames are not isolated if it has no prefix.
-        """
+        """The isolation of the part. Without a prefix, its frames are not isolated."""
         declared = self.spec.ros.isolate
         return (
             declared
@@ -83,7 +80,7 @@ class PartEntry:
 
     @property
     def settings(self) -> RosSettings:
-        """Settings for the part's processes: the holder's, with its namespace and prefix."""
+        """Settings of the part's processes: the holder's, with the part's namespace and prefix."""
         ros = self.spec.ros
         parts = (ros.namespace, self.declared.namespace or "")
         namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
@@ -92,7 +89,7 @@ class PartEntry:
         )
 
     def given_args(self) -> dict[str, ArgValue]:
-        """Return the values that the holder gives the part's arguments."""
+        """Return the values of the part's arguments that the including file sets."""
         path = (*self.path, "args")
         return {
             name: ArgValue(value, self.spec.span_of((*path, name)))
@@ -100,7 +97,7 @@ class PartEntry:
         }
 
     def overlay_on(self, inner: Source) -> Source:
-        """Return the part's source, overlaid with the holder's values for all parts."""
+        """Return the part's source, overlaid with the settings of the including robot."""
         settings = {
             "namespace": self.settings.namespace,
             "frame_prefix": self.settings.frame_prefix,
@@ -116,9 +113,9 @@ class PartEntry:
         return source
 
     def join(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
-        """Return the part with its names in the robot that contains it.
+        """Return the part with its names in the including robot.
 
-        ``implied`` are frames that only the containing robot defines.
+        ``implied`` are frames that only the including robot defines.
 
         Raises:
             RejectedError: if the prefix is invalid, or the root frame is unknown.
@@ -149,7 +146,7 @@ class PartEntry:
     def _subtree(self, robot: Robot, root: str) -> Robot:
         """Return the robot below ``root``."""
         if root not in robot.frames:
-            if robot.excuses(root):
+            if robot.tolerates(root):
                 raise RejectedError([])
             span, advice = (
                 self.spec.span_of((*self.path, "root")),
@@ -161,15 +158,16 @@ class PartEntry:
         return subtree(robot, root)
 
     def _root(self, robot: Robot, names: Names) -> str | None:
-        """Return the frame that the holder bolts on.
+        """Return the frame to attach to the including robot, None unless there is a single root.
 
-        To have none, or several, is wrong only if it has to be one.
+        Raises:
+            RejectedError: if the part has a ``parent``, so that it needs a single root.
         """
         roots = [name for name in robot.roots() if name not in names.shared]
         if self.declared.parent is None or len(roots) == 1:
             return names.frame(roots[0]) if len(roots) == 1 else None
         if robot.broken:
-            raise RejectedError([])  # what would be the root, or would hang on it, was refused
+            raise RejectedError([])  # the rejected entry may have defined the root or its parent
         held = (edge.parent for edge in robot.edges if edge.parent in names.shared)
         listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
         what = f"has several roots: {listed}" if roots else f"is a child of {listed} already"
@@ -183,17 +181,16 @@ class PartEntry:
 
 
 def _with_owner(edge: Edge, owner: str, span: Span) -> Edge:
-    """Return the edge as another owner sends it: fixed on /tf_static, moving on /tf."""
+    """Return the edge with another owner: a fixed edge on /tf_static, a moving edge on /tf."""
     return replace(
         edge, owner=owner, owner_at=span, kind="static" if edge.kind == "static" else "dynamic"
     )
 
 
 def subtree(robot: Robot, root: str) -> Robot:
-    """Return the robot below ``root``, one of its frames, which becomes the base.
+    """Return the part of the robot below the frame ``root``, which becomes the base.
 
-    Hardware, raw blocks and drivers of sensors are omitted with the joints, links and sensors that
-    they belong to.
+    Hardware, raw blocks and drivers are omitted if their joints, links or sensors are omitted.
     """
     frames = robot.below(root)
     edges = tuple(edge for edge in robot.edges if edge.child in frames and edge.child != root)

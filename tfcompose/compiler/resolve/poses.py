@@ -1,8 +1,8 @@
-"""Poses as written, solved for the pose of each child in its parent.
+"""Poses from the robot file, solved for the pose of each child in its parent.
 
-``relative_to`` gives the pose in a frame other than the parent. ``place`` gives the pose of
-another frame of the sensor than its mount. Both are solved through fixed edges only, because a
-moving edge has no pose before the robot runs.
+With ``relative_to``, a pose is in another frame than the parent. With ``place``, a pose is the
+pose of another frame of the sensor than the mount. Both are solved through fixed edges only,
+because a moving edge has no pose before the robot runs.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from tfcompose.compiler.resolve.zeros import correct_mimics, with_zero_offset
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 from tfcompose.foundation.text import list_names
@@ -28,16 +29,16 @@ if TYPE_CHECKING:
 
 
 def pose_of(posed: Posed, child: str = "") -> Pose:
-    """Return the pose as written."""
+    """Return the pose in the file, with the identity where it has no rotation."""
     turned = rotation_of(posed, child)
     x, y, z = posed.xyz
     return Pose((float(x), float(y), float(z)), turned if turned is not None else IDENTITY_XYZW)
 
 
 def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, float] | None:
-    """Return the rotation as written, or None if there is none.
+    """Return the rotation in the file as a quaternion x, y, z, w, None without a rotation.
 
-    ``look`` of an optical frame is the direction of z.
+    For an optical frame, ``look`` is the direction of z.
     """
     rotation = turned.rotation
     if rotation is not None and turned.look is not None and is_optical(child):
@@ -46,12 +47,12 @@ def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, 
 
 
 def place_of(keys: EdgeKeys | None) -> str | None:
-    """Return the frame whose pose the keys of a mount give, or None for the mount itself."""
+    """Return the frame whose pose the file states for a mount, None for the mount itself."""
     return getattr(keys, "place", None)
 
 
 def group_of(edge: Edge) -> Path:
-    """Return the entry of the part or sensor that the edge mounts or belongs to.
+    """Return the path of the part or sensor that the edge mounts or belongs to.
 
     Empty for any other edge.
     """
@@ -59,28 +60,32 @@ def group_of(edge: Edge) -> Path:
 
 
 def solve_poses(draft: Draft) -> Iterator[Finding]:
-    """Give each edge the pose of its child in its parent.
+    """Set the pose of each edge to the pose of its child in its parent.
 
-    An edge that cannot be solved keeps the pose as written.
+    A pose includes the offset of the joint's zero.
+
+    An edge that cannot be solved keeps the pose from the file.
     """
-    excuses = partial(
+    tolerates = partial(
         may_be_refused,
         broken=frozenset(draft.broken),
-        known=(*draft.frames, *draft.process_names),
+        declared=(*draft.frames, *draft.process_names),
     )
-    solver = _Solver(draft, draft.edges, excuses)
+    solver = _Solver(draft, draft.edges, tolerates)
     draft.edges = solver.solve()
+    correct_mimics(draft)
     yield from solver.findings
 
 
-#: Depth to which a chain of relative poses is followed before it is solved from its far end.
+#: Maximum depth of recursion along a chain of relative poses. A longer chain is solved from its
+#: far end.
 _DEEPEST = 50
 
 
 class _DeeperError(Exception):
-    """The edge of this index must be solved first.
+    """Another edge must be solved first, because following the chain would recurse too deep.
 
-    Following the chain further would end the interpreter.
+    ``index`` is the index of that edge.
     """
 
     def __init__(self, index: int) -> None:
@@ -89,7 +94,7 @@ class _DeeperError(Exception):
 
 
 class _UnsolvableError(Exception):
-    """A pose cannot be solved; ``finding`` is None if that follows from a refused entry."""
+    """A pose cannot be solved. ``finding`` is None if the cause is a rejected entry."""
 
     def __init__(self, finding: Finding | None) -> None:
         self.finding = finding
@@ -98,12 +103,12 @@ class _UnsolvableError(Exception):
 
 @dataclass(slots=True)
 class _Solver:
-    """Solve the edges of one draft, by index."""
+    """Solves the edges of a draft, by index."""
 
     draft: Draft
     edges: list[Edge]
-    #: Tell whether a frame, or the edge above it, may be missing because an entry was refused.
-    excuses: Callable[[str], bool]
+    #: Returns whether a frame, or the edge to it, may be missing because of a rejected entry.
+    tolerates: Callable[[str], bool]
     #: Findings about edges that cannot be solved.
     findings: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
@@ -111,7 +116,7 @@ class _Solver:
     _above: dict[str, int] = field(default_factory=dict)
 
     def solve(self) -> list[Edge]:
-        """Return the edges with their poses, in order."""
+        """Return the edges with their solved poses, in order."""
         for index, edge in enumerate(self.edges):
             self._above.setdefault(edge.child, index)
         for index in range(len(self.edges)):
@@ -133,7 +138,8 @@ class _Solver:
     def _give_up(self, index: int, finding: Finding | None) -> None:
         if finding and finding not in self.findings:
             self.findings.append(finding)
-        self._solved[index] = replace(self.edges[index], calibration=None)
+        edge = replace(self.edges[index], calibration=None)
+        self._solved[index] = with_zero_offset(edge, self.draft.keys.get(index))
 
     def _edge(self, index: int) -> Edge:
         if index in self._solved:
@@ -148,20 +154,21 @@ class _Solver:
             edge = self._calibrate(index, edge.calibration, keys)
         elif keys and (keys.relative_to or place_of(keys)):
             edge = replace(edge, pose=self._declared_pose(index, keys))
+        edge = with_zero_offset(edge, keys)
         self._open.pop()
         self._solved[index] = edge
         return edge
 
     def _span_of(self, index: int, key: str) -> Span:
-        """Return the place of the value of a key of an edge."""
+        """Return the span of the value of an edge's key."""
         return self.draft.spec.span_of((*self.edges[index].entry, key))
 
     def _is_broken(self, index: int) -> bool:
-        """Whether something in the entry that gives the edge was refused."""
+        """Return whether a value in the edge's entry was rejected."""
         return index in self.draft.keys and self.edges[index].entry in self.draft.validated.broken
 
     def _declared_pose(self, index: int, keys: EdgeKeys) -> Pose:
-        """Return the pose of the edge's child in its parent, from the pose that is written."""
+        """Return the pose of the edge's child in its parent, computed from the file's pose."""
         edge, place = self.edges[index], place_of(keys)
         pose = edge.pose
         if keys.relative_to:
@@ -178,7 +185,7 @@ class _Solver:
         return pose
 
     def _calibrate(self, index: int, measured: Calibration, keys: EdgeKeys) -> Edge:
-        """Return the edge with its calibrated pose and its nominal one."""
+        """Return the edge with its calibrated pose and its nominal pose."""
         edge, span = self.edges[index], measured.named_at
         above = below = Pose()
         if measured.parent != edge.parent:
@@ -193,15 +200,18 @@ class _Solver:
         return replace(edge, pose=above @ measured.pose @ below.inverse(), calibration=measured)
 
     def _inside(self, edge: Edge) -> list[str]:
-        """Return the frames that the entry of the edge brings, its own first."""
+        """Return the frames that the edge's entry defines, with the entry's own frame first."""
         group = group_of(edge)
-        return [other.child for other in self.edges if group_of(other) == group]
+        return [member.child for member in self.edges if group_of(member) == group]
 
     def _known_frame(self, frame: str, span: Span, inside: list[str] | None = None) -> str:
-        """Return the frame, which must be one of ``inside``, those that nobody else brings."""
+        """Return the frame if it exists, otherwise raise.
+
+        ``inside`` lists the frames that are valid here; None for all frames.
+        """
         if frame in self.draft.frames:
             return frame
-        if self.excuses(frame) and not inside:
+        if self.tolerates(frame) and not inside:
             raise _UnsolvableError(None)
         otherwise = f"one of: {list_names(inside)}" if inside else ""
         advice = advise_left_out(self.draft.validated.conditions, frame) or did_you_mean(
@@ -210,7 +220,7 @@ class _Solver:
         raise _UnsolvableError(finding("TF203", f"unknown frame {frame}", span, help=advice))
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
-        """Return the frame and its ancestors, each with the index of its edge (the root: −1)."""
+        """Return the frame and its ancestors, each with the index of its edge; -1 for the root."""
         chain: dict[str, int] = {}
         while frame in self._above and frame not in chain:
             chain[frame] = self._above[frame]
@@ -218,11 +228,11 @@ class _Solver:
         return [*chain.items(), (frame, -1)]
 
     def _between(self, a: str, b: str, span: Span) -> Pose:
-        """Return the pose of b in a, through fixed edges."""
+        """Return the pose of frame ``b`` in frame ``a`` through fixed edges."""
         up_a, up_b = self._chain(a), self._chain(b)
         ancestors = {frame for frame, _ in up_a}
         meeting = next((frame for frame, _ in up_b if frame in ancestors), None)
-        if meeting is None and (self.excuses(up_a[-1][0]) or self.excuses(up_b[-1][0])):
+        if meeting is None and (self.tolerates(up_a[-1][0]) or self.tolerates(up_b[-1][0])):
             raise _UnsolvableError(None)
         if meeting is None:
             message = (
@@ -232,7 +242,7 @@ class _Solver:
         return self._down(up_a, meeting, span).inverse() @ self._down(up_b, meeting, span)
 
     def _down(self, chain: list[tuple[str, int]], top: str, span: Span) -> Pose:
-        """Return the pose of the chain's first frame in ``top``."""
+        """Return the pose of the chain's first frame in ``top``, one of its ancestors."""
         pose = Pose()
         for frame, index in chain:
             if frame == top:
@@ -242,7 +252,7 @@ class _Solver:
                 raise _UnsolvableError(None)
             if edge.kind != "static" and not (
                 edge.sensor and not edge.declared
-            ):  # a driver may send it again and again
+            ):  # a driver may publish it repeatedly
                 note = Note(f"{edge.name} is published by {edge.owner}", edge.span)
                 what = (
                     f"the joint {edge.joint.name} moves"
@@ -253,7 +263,7 @@ class _Solver:
                 message = f"{what}, so the pose cannot be solved"
                 raise _UnsolvableError(finding("TF404", message, span, notes=[note], help=advice))
             if not edge.pose_known and edge.owner == STATIC:
-                raise _UnsolvableError(None)  # TF605 says so
+                raise _UnsolvableError(None)  # TF605 reports it
             if not edge.pose_known:
                 message = (
                     f"only {edge.owner} knows where {edge.child} is, so the pose cannot be solved"
@@ -264,12 +274,12 @@ class _Solver:
         return pose
 
     def _below(self, index: int, place: str, span: Span) -> Pose:
-        """Return the pose of ``place`` in the edge's child, which must be above it."""
+        """Return the pose of ``place`` in the edge's child, which must be above ``place``."""
         chain = self._chain(place)
         names = [frame for frame, _ in chain]
         outer, is_broken = self.edges[index], self._is_broken(index)
         mount = outer.child
-        if mount not in names and (is_broken or self.excuses(names[-1])):
+        if mount not in names and (is_broken or self.tolerates(names[-1])):
             raise _UnsolvableError(None)
         if mount not in names:
             message = (
@@ -307,7 +317,7 @@ class _Solver:
 
 
 def _values_of(edge: Edge) -> str:
-    """Return the help where the values of a unit's own frame are missing."""
+    """Return help for a frame whose values differ from unit to unit and are not in the file."""
     return (
         f"write this unit's values at the sensor: frames: {{{edge.child}: {{xyz: […], rpy: […]}}}}"
     )

@@ -1,7 +1,7 @@
-"""Presets: their files, their contents with all they extend, and a sensor's options.
+"""Presets: their files, their content including extended presets, and a sensor's options.
 
-A preset is looked up when it is used. Folders are listed only for a wrong name, or to list all
-presets. Presets of nodes are part of the program, next to its code.
+A preset's file is read only when the preset is used. Folders are listed only for a wrong name, or
+to list all presets. Presets of nodes belong to the program and are stored next to its code.
 """
 
 from __future__ import annotations
@@ -42,25 +42,25 @@ DRIVER, TFCOMPOSE = "driver", "tfcompose"
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A sensor with its preset and the values of its options."""
+    """A sensor, with its preset and the values of the preset's options."""
 
     name: str
     spec: SensorSpec
     preset: PresetSpec
     options: dict[str, Any]
-    #: The publisher of the frames that a driver can publish.
+    #: The publisher of frames that the driver can publish.
     tf: str = TFCOMPOSE
 
     def fill_name(self, pattern: str) -> str:
-        """Return a preset's name with the sensor's name inserted."""
+        """Return a name pattern of the preset with the sensor's name inserted."""
         return fill_name(pattern, self.name, self.preset.words)
 
     def holds(self, condition: dict[str, Any]) -> bool:
-        """Return whether every option has, or holds, the value that the condition names."""
+        """Return whether every option has, or contains, the value in the condition."""
         return holds(condition, self.options, self.tf)
 
     def frames(self) -> dict[str, PresetFrame]:
-        """Return the sensor's frames by their final names, before any renaming of parts."""
+        """Return the sensor's frames by their names, before any renaming."""
         return {
             self.fill_name(name): frame
             for name, frame in self.preset.frames.items()
@@ -68,13 +68,13 @@ class Sensor:
         }
 
     def parent_of(self, name: str, frame: PresetFrame) -> str:
-        """Return the frame's parent before any renaming.
+        """Return the parent of a frame, before any renaming.
 
-        As the user gives it, or as its publisher sends it.
+        The robot file's parent takes precedence, then the parent that the frame's publisher uses.
         """
-        own = self.spec.frames.get(name)
-        if own and own.parent:
-            return own.parent
+        override = self.spec.frames.get(name)
+        if override and override.parent:
+            return override.parent
         return self.fill_name(
             frame.by_driver.parent if frame.by_driver and self.tf == DRIVER else frame.parent
         )
@@ -96,9 +96,9 @@ def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
 
     ``tf`` counts as an option.
     """
-    for option, wanted in condition.items():
+    for option, expected in condition.items():
         value = tf if option == "tf" else options.get(option)
-        every = wanted if isinstance(wanted, list) else [wanted]
+        every = expected if isinstance(expected, list) else [expected]
         chosen = value if isinstance(value, (list, tuple)) else [value]
         if not all(item in chosen for item in every):
             return False
@@ -108,7 +108,7 @@ def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
 def sensor_of(
     name: str, declared: SensorSpec, library: Library, spec: RobotSpec
 ) -> Generator[Finding, None, Sensor | None]:
-    """Return the sensor with its preset and options, or None if it has no preset."""
+    """Return the sensor with its preset and options, None without a valid preset."""
     path: Path = ("sensors", name)
     span = spec.span_of((*path, "preset"))
     try:
@@ -146,7 +146,7 @@ def _no_preset(name: str, library: Library, span: Span) -> Finding:
     names = library.names
     vendor = name.partition("/")[0]
     same = [name for name in names if name.startswith(f"{vendor}/")]
-    there = (
+    otherwise = (
         f"presets of {vendor}: {', '.join(same)}"
         if same
         else f"tfcompose presets lists them; {_OWN}"
@@ -159,18 +159,18 @@ def _no_preset(name: str, library: Library, span: Span) -> Finding:
     advice = (
         f"did you mean {' or '.join(models)}?"
         if models and not same
-        else did_you_mean(name, same or names, there)
+        else did_you_mean(name, same or names, otherwise)
     )
     return finding("TF601", f"unknown preset {name}", span, help=advice)
 
 
 def _publisher(sensor: Sensor) -> str:
-    """Return who publishes the frames that a driver can.
+    """Return the publisher of frames that the driver can publish.
 
-    As said, or as the vendor's driver does by default.
+    This is the value of ``tf``, otherwise the default of the vendor's driver.
     """
-    driver, own = sensor.preset.driver, sensor.spec.driver
-    if driver is None or (own and own.process == "none"):
+    driver, override = sensor.preset.driver, sensor.spec.driver
+    if driver is None or (override and override.process == "none"):
         return TFCOMPOSE
     if not sensor.driver_frames():
         return TFCOMPOSE
@@ -180,18 +180,18 @@ def _publisher(sensor: Sensor) -> str:
 def decide_options(
     preset: PresetSpec, declared: SensorSpec, path: Path, spec: RobotSpec
 ) -> tuple[dict[str, Any], list[Finding]]:
-    """Return the values of the preset's options, and findings about the given ones."""
+    """Return the values of the preset's options, and findings about invalid values."""
     options = {key: option.default for key, option in preset.options.items()}
     findings = []
     for key, value in declared.options.items():
         span = spec.span_of((*path, "options", key))
         if key not in preset.options:
-            there = (
+            otherwise = (
                 f"{declared.preset} has {', '.join(preset.options)}"
                 if preset.options
                 else f"{declared.preset} has none"
             )
-            advice = did_you_mean(key, preset.options, there)
+            advice = did_you_mean(key, preset.options, otherwise)
             findings.append(
                 finding("TF603", f"{declared.preset} has no option {key}", span, help=advice)
             )
@@ -206,7 +206,7 @@ def decide_options(
 
 
 def _as_text(value: Any) -> Any:
-    """Return the value for a variant's name: a number or true as written."""
+    """Return the value as text in a variant's name."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, (int, float)) else value
@@ -224,26 +224,25 @@ def _refusal(option: PresetOption, key: str, value: Any, span: Span) -> Finding 
         return finding("TF603", f"the option {key} cannot be {value!r}", span, help=advice)
     if option.type != "set":
         return None
-    known = ", ".join(option.values)
+    values = ", ".join(option.values)
     if not isinstance(value, list):
         return finding(
-            "TF603", f"the option {key} is not a list", span, help=f"a list of some of: {known}"
+            "TF603", f"the option {key} is not a list", span, help=f"a list of some of: {values}"
         )
     for item in value:
         if item not in option.values:
-            advice = did_you_mean(str(item), option.values, f"one of: {known}")
+            advice = did_you_mean(str(item), option.values, f"one of: {values}")
             return finding("TF603", f"the option {key} cannot hold {item!r}", span, help=advice)
     return None
 
 
-#: vendor/model; a model that begins with _ is there to be extended only, and nodes/ holds no
-#: sensors.
+#: A name, vendor/model. A model that begins with _ can only be extended. nodes/ holds no sensors.
 _NAME = re.compile(r"(?!nodes/)[A-Za-z0-9][A-Za-z0-9_.-]*/_?[A-Za-z0-9][A-Za-z0-9_.-]*")
 _DEEPEST = 8
 
 
 class Storage(Protocol):
-    """The folders and files of presets."""
+    """Access to the folders and files of presets."""
 
     def has(self, path: str) -> bool:
         """Return whether the file exists."""
@@ -252,71 +251,84 @@ class Storage(Protocol):
         """Return whether the folder exists."""
 
     def read(self, path: str) -> str:
-        """Return its text; raises RejectedError."""
+        """Return the text of the file.
+
+        Raises:
+            RejectedError: if the file cannot be read.
+        """
 
     def models(self, folder: str) -> list[str]:
         """Return the names, vendor/model, of the presets in the folder."""
 
     def packages(self) -> list[str]:
-        """Return the folders of presets in installed Python packages.
+        """Return the preset folders in installed Python packages.
 
-        The lookup is slow, so it happens only when needed.
+        This lookup is slow, so callers do it only when needed.
         """
 
 
 @dataclass(slots=True)
 class Library:
-    """Presets in folders. Earlier folders take precedence, and packages come last."""
+    """Presets in folders.
+
+    Earlier folders take precedence; folders of Python packages come last.
+    """
 
     folders: tuple[str, ...]
     storage: Storage
-    own: str = ""
+    #: The folder of the presets that come with tfcompose; empty: none.
+    built_in: str = ""
     _sources: dict[str, Source] = field(default_factory=dict)
     _specs: dict[tuple[str, tuple[tuple[str, str], ...]], PresetSpec] = field(default_factory=dict)
     _files: dict[str, str | None] = field(default_factory=dict)
 
     def over(self, folders: Iterable[str]) -> Library:
-        """Return a library that searches these folders first."""
-        return Library((*map(posixpath.normpath, folders), *self.folders), self.storage, self.own)
+        """Return a library that searches ``folders`` first."""
+        return Library(
+            (*map(posixpath.normpath, folders), *self.folders), self.storage, self.built_in
+        )
 
     @property
     def names(self) -> list[str]:
-        """The names of all presets, in order."""
-        known = {name for folder in self._all() for name in self.storage.models(folder)}
-        return sorted(name for name in known if "/_" not in name and _NAME.fullmatch(name))
+        """The names of all presets, sorted."""
+        models = {name for folder in self._all() for name in self.storage.models(folder)}
+        return sorted(name for name in models if "/_" not in name and _NAME.fullmatch(name))
 
     def file(self, name: str) -> str | None:
-        """Return the preset's file, or None if there is no preset of that name."""
+        """Return the preset's file, None if no preset has this name."""
         if name not in self._files:
             self._files[name] = self._find(name, self.folders) or self._find_late(name)
         return self._files[name]
 
     def hides(self, name: str) -> str | None:
-        """Return the built-in preset's file that another one of this name shadows, or None."""
-        mine = self._find(name, (self.own,)) if self.own else None
+        """Return the file of the built-in preset that another preset with this name shadows.
+
+        None if no preset is shadowed.
+        """
+        mine = self._find(name, (self.built_in,)) if self.built_in else None
         return mine if mine and self.file(name) != mine else None
 
     def source(self, name: str, deep: int = 0) -> Source:
-        """Return the preset's contents, laid over the preset that it extends.
+        """Return the content of the preset, merged over the preset that it extends.
 
         Raises:
-            KeyError: if no preset has that name.
-            RejectedError: if it, or what it extends, is no preset.
+            KeyError: if no preset has this name.
+            RejectedError: if the preset, or a preset that it extends, is invalid.
         """
         if name not in self._sources:
             file = self.file(name)
             if file is None:
                 raise KeyError(name)
-            own = load_named(self.storage.read(file), file)
-            self._sources[name] = self._extend(own, name, deep)
+            extension = load_named(self.storage.read(file), file)
+            self._sources[name] = self._extend(extension, name, deep)
         return self._sources[name]
 
     def get(self, name: str, choices: Mapping[str, str] | None = None) -> PresetSpec:
-        """Return the preset; ``choices`` are the options that lay a variant over it.
+        """Return the preset. ``choices`` are the options that select a variant.
 
         Raises:
-            KeyError: if no preset has that name.
-            RejectedError: if the preset itself is wrong.
+            KeyError: if no preset has this name.
+            RejectedError: if the preset is invalid.
         """
         options = tuple(sorted((choices or {}).items()))
         if (name, options) not in self._specs:
@@ -327,17 +339,17 @@ class Library:
             self._specs[name, options] = validate_preset(source)
         return self._specs[name, options]
 
-    def _extend(self, own: Source, name: str, deep: int) -> Source:
-        base = extended_preset(own)
+    def _extend(self, extension: Source, name: str, deep: int) -> Source:
+        base = extended_preset(extension)
         if base is None:
-            return own
-        span = own.span_of(("extends",))
+            return extension
+        span = extension.span_of(("extends",))
         if deep > _DEEPEST:
             raise RejectedError(
                 [finding("TF606", f"{name} extends itself, by way of others", span)]
             )
-        if base == name:  # it stands before one of the same name, and changes it
-            later = self._later(own.file)
+        if base == name:  # it extends the preset that it shadows
+            later = self._later(extension.file)
             below = (
                 self._extend(load_named(self.storage.read(later), later), name, deep + 1)
                 if later
@@ -349,10 +361,10 @@ class Library:
             raise RejectedError(
                 [finding("TF606", f"{name} extends {base}, which does not exist", span)]
             )
-        return lay_over(without(below, "extends"), own, is_overlay=False, of=PresetSpec)
+        return lay_over(without(below, "extends"), extension, is_overlay=False, of=PresetSpec)
 
     def _later(self, file: str) -> str | None:
-        """Return the preset file of the same name that this file shadows."""
+        """Return the preset file that this file shadows, or None."""
         folder, name = _split(file)
         behind = (*self.folders, *self.storage.packages())
         return self._find(name, behind[behind.index(folder) + 1 :])
@@ -373,7 +385,7 @@ class Library:
 
 
 def _split(file: str) -> tuple[str, str]:
-    """Return the folder and the name, vendor/model, of a preset's file."""
+    """Return the folder and the name, vendor/model, of a preset file."""
     rest, model = posixpath.split(file.removesuffix(".yaml"))
     folder, vendor = posixpath.split(rest)
     return folder, f"{vendor}/{model}"
@@ -384,7 +396,7 @@ _NODE_PRESETS = pathlib.Path(__file__).parents[2] / "data" / "presets" / "nodes"
 
 @cache
 def _node_files() -> dict[str, pathlib.Path]:
-    """Return the file of each preset of a node, PACKAGE/NAME.yaml, by its name."""
+    """Return the files of all presets of nodes, PACKAGE/NAME.yaml, by name."""
     return {file.stem: file for file in sorted(_NODE_PRESETS.glob("*/*.yaml"))}
 
 
@@ -396,11 +408,11 @@ def node_preset_names() -> tuple[str, ...]:
 
 @cache
 def node_preset(name: str) -> NodePresetSpec:
-    """Return the preset of this name, or of PACKAGE/NAME.
+    """Return the preset of a node by its name or by PACKAGE/NAME.
 
     Raises:
-        KeyError: if no preset has that name.
-        RejectedError: if the preset itself is wrong.
+        KeyError: if no preset has this name.
+        RejectedError: if the preset is invalid.
     """
     package, _, short = name.rpartition("/")
     file = _node_files()[short]
@@ -412,7 +424,7 @@ def node_preset(name: str) -> NodePresetSpec:
 
 
 def is_node_preset(name: str) -> bool:
-    """Return whether there is a preset of this name, or of PACKAGE/NAME."""
+    """Return whether a preset of a node has this name or this PACKAGE/NAME."""
     try:
         node_preset(name)
     except KeyError:
@@ -423,7 +435,7 @@ def is_node_preset(name: str) -> bool:
 
 
 def unknown_node_preset(name: str, span: Span) -> Finding:
-    """Return the finding for an unknown name of a node's preset."""
+    """Return the finding for an unknown preset of a node."""
     names = node_preset_names()
     return finding(
         "TF601",
@@ -434,9 +446,9 @@ def unknown_node_preset(name: str, span: Span) -> Finding:
 
 
 def preset_of(node: NamedNode | None) -> str | None:
-    """Return the name of a node's preset, None if it has none.
+    """Return the name of the node's preset, None without a preset.
 
-    A node whose own name is a preset's PACKAGE/NAME has that preset.
+    If the node's name is the PACKAGE/NAME of a preset, the node has that preset.
     """
     if node is None or node.preset is not None:
         return node.preset if node else None
@@ -446,9 +458,9 @@ def preset_of(node: NamedNode | None) -> str | None:
 
 
 def start_advice(node: NamedNode | None, otherwise: str) -> str:
-    """Return advice for a process without a program to start.
+    """Return advice for a process without a program.
 
-    If its node's name is close to a preset's PACKAGE/NAME, suggest that preset.
+    If the node's name is similar to a preset's PACKAGE/NAME, the advice suggests that preset.
     """
     package, _, short = (node.name or "" if node else "").rpartition("/")
     near = nearest(
@@ -458,7 +470,7 @@ def start_advice(node: NamedNode | None, otherwise: str) -> str:
 
 
 def name_of(node: NamedNode | None) -> str | None:
-    """Return the name given to a node, None if it is its preset's name."""
+    """Return the node's name, None if that name is only the name of its preset."""
     if node is None or (node.preset is None and preset_of(node)):
         return None
     return node.name

@@ -1,6 +1,6 @@
-"""Processes: start, simulation or external owner, names, and end.
+"""Processes: their names and how they start and end, including simulated and external processes.
 
-tfcompose's own processes are here as well: ``static``, ``joints`` and ``guard``.
+This module also makes the processes that tfcompose provides: ``static``, ``joints``, ``guard``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from tfcompose.model.robot import (
     Node,
     Process,
 )
-from tfcompose.spec.language.habits import habit
+from tfcompose.spec.language.key_hints import habit
 from tfcompose.spec.language.process import (
     RUNNING,
     SIMULATIONS,
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
 
 
 def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Finds[Process | None]:
-    """Return the process that the user describes, or None if something is missing."""
+    """Return the process that the entry describes, None if a required key is missing."""
     spec = validated.spec
     path: Path = ("processes", name)
     span = spec.key_span(path)
@@ -120,12 +120,12 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
     return None
 
 
-#: Rate of a simulated owner's edge that declares none.
+#: Rate in Hz of a simulated owner's edge without a declared rate.
 _USUAL_RATE_HZ = 20.0
 
 
 def _declared_rate(owner: str, spec: RobotSpec) -> float:
-    """Return the highest rate that edges of the owner declare, in Hz."""
+    """Return the highest declared rate of the owner's edges, in Hz."""
     sections = (spec.frames, spec.links, spec.joints, spec.parts)
     rates = [
         entry.rate
@@ -137,7 +137,7 @@ def _declared_rate(owner: str, spec: RobotSpec) -> float:
 
 
 def _simulation(name: str, simulate: Simulate, validated: Validated) -> Finds[Simulation | None]:
-    at: Path = ("processes", name, "simulate")
+    entry_path: Path = ("processes", name, "simulate")
     rate = simulate.rate or _declared_rate(name, validated.spec)
     if simulate.circle:
         return Simulation(
@@ -151,15 +151,16 @@ def _simulation(name: str, simulate: Simulate, validated: Validated) -> Finds[Si
     if simulate.joints is not None:
         return Simulation("joints", rate)
     if not any(
-        path[:3] == at and path[3:4] and path[3] in SIMULATIONS for path in validated.refused
+        path[:3] == entry_path and path[3:4] and path[3] in SIMULATIONS
+        for path in validated.refused
     ):
         message = f"{name}: simulate needs circle, fixed or joints"
-        yield finding("TF102", message, validated.spec.key_span(at))
+        yield finding("TF102", message, validated.spec.key_span(entry_path))
     return None
 
 
 def _is_way_refused(name: str, validated: Validated) -> bool:
-    """Return whether what says how it runs was refused, and is missing only therefore."""
+    """Return whether the key that defines how the process runs was rejected."""
     refused = [
         path[2:]
         for path in validated.refused
@@ -175,7 +176,7 @@ def _is_way_refused(name: str, validated: Validated) -> bool:
 def check_names(draft: Draft) -> Iterator[Finding]:
     """Yield a finding for each name that a sensor and a process, or two processes, share.
 
-    A sensor may have the name of the process that drives it.
+    A sensor may share the name of the process that drives it.
     """
     spec = draft.spec
     first: dict[str, Process] = {}
@@ -184,9 +185,9 @@ def check_names(draft: Draft) -> Iterator[Finding]:
         if name in spec.processes and not driven_by_it:
             first[name] = Process(name, "external", span=spec.key_span(("sensors", name)))
     for process in draft.all_processes:
-        other = first.setdefault(process.name, process)
-        if other.span != process.span:
-            notes = [Note(f"{other.name} is also defined here", other.span)]
+        first_process = first.setdefault(process.name, process)
+        if first_process.span != process.span:
+            notes = [Note(f"{first_process.name} is also defined here", first_process.span)]
             advice = "rename one of them"
             if process.name in spec.sensors:
                 advice += f", or, if it drives the sensor, driver: {process.name}"
@@ -198,28 +199,28 @@ def check_names(draft: Draft) -> Iterator[Finding]:
 
 
 def check_waits(draft: Draft) -> Iterator[Finding]:
-    """Yield a finding for each unknown name under ``after`` and each impossible end.
+    """Yield findings about unknown names under ``after``, and waits for ends that never come.
 
-    A name that a refused entry may have added is not reported.
+    A name that a rejected entry may define is not reported.
     """
-    spec, known = draft.spec, draft.process_names
+    spec, process_names = draft.spec, draft.process_names
     refused = {name for _, name in draft.broken}
     missing = tuple(name for section, name in draft.broken if section == "parts" and name)
     lasting = {process.name for process in draft.processes if process.kind != "run"}
     for process in draft.processes:
         path: Path = (*entry_of(process, spec), "after")
-        for other, what in process.after.items():
-            if what == "done" and other in lasting:
-                message = f"{process.name} waits until {other} is done, which never happens"
-                advice = f"after: {{{other}: ready}}, or started"
-                yield finding("TF813", message, spec.span_of((*path, other)), help=advice)
-            elif process.component and other == process.component.container:
-                continue  # it was not written here
-            elif other not in known | refused and not other.startswith(missing):
-                names = sorted(known - {process.name})
-                advice = did_you_mean(other, names, f"one of: {', '.join(names)}")
-                message = f"{process.name} waits for {other}, which is not a process"
-                yield finding("TF813", message, spec.key_span((*path, other)), help=advice)
+        for awaited, what in process.after.items():
+            if what == "done" and awaited in lasting:
+                message = f"{process.name} waits until {awaited} is done, which never happens"
+                advice = f"after: {{{awaited}: ready}}, or started"
+                yield finding("TF813", message, spec.span_of((*path, awaited)), help=advice)
+            elif process.component and awaited == process.component.container:
+                continue  # tfcompose adds this wait
+            elif awaited not in process_names | refused and not awaited.startswith(missing):
+                names = sorted(process_names - {process.name})
+                advice = did_you_mean(awaited, names, f"one of: {', '.join(names)}")
+                message = f"{process.name} waits for {awaited}, which is not a process"
+                yield finding("TF813", message, spec.key_span((*path, awaited)), help=advice)
 
 
 def check_launch_nodes(draft: Draft) -> Iterator[Finding]:
@@ -243,7 +244,10 @@ _FIELDS = frozenset(field.name for field in fields(Process) if field.init)
 
 
 def how(declared: StartedSpec | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:
-    """Return the fields of a process that runs in this way, from the keys of the same names."""
+    """Return keyword arguments for ``Process`` from the keys of the same names in the entry.
+
+    ``way`` selects the keys that have an effect on such a process.
+    """
     stated: dict[str, Any] = {}
     for key in _FIELDS & keys_of(way):
         value = getattr(declared, key)
@@ -259,9 +263,9 @@ def how(declared: StartedSpec | ContainerSpec, namespace: str, way: Way = "run")
 
 
 def program(run: Run, *, shell: bool) -> dict[str, Any]:
-    """Return the program to start: a package's program, a launch file, or a command.
+    """Return keyword arguments for the program: a package's program, a launch file, or a command.
 
-    A shell's command is one text.
+    With ``shell``, the command is a single string.
     """
     if shell and run.argv:
         return {"argv": (*SHELL, *run.argv)}
@@ -274,9 +278,9 @@ def program(run: Run, *, shell: bool) -> dict[str, Any]:
 
 
 def _of_ros2(argv: tuple[str, ...]) -> dict[str, Any] | None:
-    """Return what a command line of ``ros2 run`` or ``ros2 launch`` starts, or None for any other.
+    """Return the program that ``ros2 run`` or ``ros2 launch`` starts, None for other commands.
 
-    Options of ``ros2`` itself, and a launch file that is given by its path, are left to ``ros2``.
+    A command with options of ``ros2`` itself, or with a path to a launch file, is kept as it is.
     """
     match argv:
         case ("ros2", "run", package, executable, *words) if not package.startswith("-"):
@@ -307,17 +311,17 @@ def _ready(declared: ReadySpec, namespace: str) -> Ready | None:
         return Ready("time", number=declared.time, timeout_s=timeout_s)
     return (
         Ready("edges", timeout_s=timeout_s) if declared.edges else None
-    )  # what else was said was refused
+    )  # any other condition was rejected
 
 
-#: The parameters of ``joints``: robot_state_publisher's, where it has them, each with an example.
+#: Parameters of ``joints``, each with an example. They are parameters of robot_state_publisher.
 _JOINTS_PARAMS: dict[str, Any] = {"publish_frequency": 30.0, "ignore_timestamp": True}
 _KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
 
 
 def built_in_processes(spec: RobotSpec) -> list[Process]:
-    """Return tfcompose's own processes, with their keys under ``processes``."""
-    own = []
+    """Return the processes that tfcompose provides, with the keys under their names."""
+    built_in = []
     for name in BUILT_IN:
         declared = spec.processes.get(name)
         span = spec.key_span(("processes", name)) if declared else spec.key_span(("robot",))
@@ -327,14 +331,14 @@ def built_in_processes(spec: RobotSpec) -> list[Process]:
         process = Process(name, _KINDS[name], span=span, ros_nodes=(node,))
         if declared:
             process = replace(process, **how(declared, spec.ros.namespace, "built-in"))
-        own.append(process)
-    return own
+        built_in.append(process)
+    return built_in
 
 
 def says_how(declared: ProcessSpec | None) -> bool:
-    """Return whether the entry says how its process runs.
+    """Return whether the entry defines how its process runs.
 
-    Otherwise the entry adds keys to one of tfcompose's own processes.
+    Otherwise the entry only adds keys to a process that tfcompose provides.
     """
     return declared is not None and bool(
         declared.run or declared.external or declared.simulate or declared.component
@@ -344,7 +348,7 @@ def says_how(declared: ProcessSpec | None) -> bool:
 def add_process(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
     """Return a process that tfcompose adds, with the keys under its name.
 
-    It runs on the host of ``static``.
+    By default it runs on the host of ``static``.
     """
     if declared:
         stated = how(declared, spec.ros.namespace, "built-in")
@@ -356,11 +360,11 @@ def add_process(process: Process, declared: ProcessSpec | None, spec: RobotSpec)
 
 
 def check_built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield findings about entries named after tfcompose's own processes."""
+    """Yield findings about entries named after processes that tfcompose provides."""
     path: Path = ("processes", name)
-    known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
-    wrong = declared.model_fields_set - known
-    advice = f"its keys can be: {', '.join(sorted(known))}"
+    keys = keys_of("built-in") | ({"params"} if name == JOINTS else set())
+    wrong = declared.model_fields_set - keys
+    advice = f"its keys can be: {', '.join(sorted(keys))}"
     if wrong & RUNNING:
         advice = (
             f"give what {'joints publishes from' if name == JOINTS else 'you start'} a name of its"
@@ -395,7 +399,7 @@ def _joints_params(params: dict[str, Any], spec: RobotSpec) -> Iterator[Finding]
 
 
 def check_keys(draft: Draft) -> Iterator[Finding]:
-    """Yield a finding for each key of a process that has no effect there."""
+    """Yield a finding for each key of a process that has no effect."""
     spec = draft.spec
     yield from _idle_of_containers(spec)
     for name, process in spec.processes.items():
@@ -408,7 +412,7 @@ def check_keys(draft: Draft) -> Iterator[Finding]:
 
 
 def _idle_of_containers(spec: RobotSpec) -> Iterator[Finding]:
-    """Yield a finding for each key of an external container, where it has no effect."""
+    """Yield a finding for each key without effect on an external container."""
     for name, container in spec.containers.items():
         works = keys_of("external") | {"external"}
         for key in container.model_fields_set - works if container.external else ():
@@ -420,7 +424,7 @@ def _idle_of_containers(spec: RobotSpec) -> Iterator[Finding]:
 
 
 def _idle_rate(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield a finding about a rate: only ``joints`` has one."""
+    """Yield a finding about the key ``rate``, which only ``joints`` has."""
     if process.rate is None or path == ("processes", JOINTS):
         return
     advice = "remove it; the rate belongs to the edge: odom: {parent: map, owner: …, rate: 10 Hz}"
@@ -433,10 +437,11 @@ def _idle_rate(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> 
 
 
 def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield a finding for each key beside external or simulate that does nothing.
+    """Yield a finding for each key without effect on the process.
 
-    Where an overlay puts that in the place of something else, the keys below it are meant for what
-    they stood beside.
+    Keys are without effect on an external or simulated process, or on a component. If an overlay
+    made the process external, for example, the other keys are intended for the robot without the
+    overlay. They are not reported.
     """
     yield from _idle_rate(path, name, process, spec)
     way: Way = "external" if process.external else "simulate" if process.simulate else "run"
@@ -446,7 +451,7 @@ def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Itera
         or (*path, way) in spec.spans.replaced
         or (way == "simulate" and path[0] == "sensors")
     ):
-        return  # no driver is simulated: that is refused
+        return  # a simulated driver is rejected elsewhere
     what, whom = "simulated", "on the real process"
     if way == "external":
         what, whom = "external", "where the process is started"
@@ -454,7 +459,7 @@ def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Itera
         what, whom = "a component", f"on the container {process.container}"
     for key in (
         process.model_fields_set - keys_of(way) - RUNNING - {"rate"}
-    ):  # which are refused elsewhere
+    ):  # ``RUNNING`` keys are rejected elsewhere
         message, advice = (
             f"{name} is {what}, so {key} has no effect",
             f"remove it, or set it {whom}",
@@ -463,7 +468,7 @@ def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Itera
 
 
 def check_arguments(draft: Draft) -> Iterator[Finding]:
-    """Yield findings about files without parameters and keys that reach no node."""
+    """Yield findings about parameter files without parameters, and keys that reach no node."""
     spec = draft.spec
     for process in draft.robot.processes:
         path: Path = ("processes", process.name)
@@ -485,7 +490,7 @@ def check_arguments(draft: Draft) -> Iterator[Finding]:
 
 
 def _unreached_key(key: str, process: Process, span: Span) -> Finding:
-    """Return a warning about a key for ROS arguments that a shell or launch file drops."""
+    """Return a warning about a key for ROS arguments that a shell or launch file ignores."""
     advice = f"write it into the command: --ros-args {ROS_ARGUMENTS[key]}; or give run as a list"
     message = f"{key} does not reach {process.name}, whose run is a shell command"
     if process.argv[:2] == ROS2_LAUNCH:
@@ -497,14 +502,14 @@ def _unreached_key(key: str, process: Process, span: Span) -> Finding:
     return finding("TF107", message, span, help=advice, severity="warning")
 
 
-#: The key among a process's parameters that names files with more of them.
+#: The key in a process's parameters that names parameter files.
 FILE_KEY = "file"
 
 
 def full_name(namespace: str, name: str) -> str:
-    """Return a node's, topic's or service's full name.
+    """Return the full name of a node, topic or service.
 
-    Below the namespace, unless it begins with a slash.
+    A name that does not begin with a slash is below the namespace.
     """
     if name.startswith("/"):
         return name
@@ -514,7 +519,7 @@ def full_name(namespace: str, name: str) -> str:
 def namespace_of(declared: StartedSpec | ContainerSpec | None, namespace: str) -> str:
     """Return the namespace of a process's nodes, without a leading slash.
 
-    The process's own, or the robot's ``namespace``.
+    By default this is ``namespace``, the robot's.
     """
     if declared is None or declared.namespace is None:
         return namespace
@@ -522,12 +527,12 @@ def namespace_of(declared: StartedSpec | ContainerSpec | None, namespace: str) -
 
 
 def names_files(params: dict[str, Any]) -> bool:
-    """Return whether parameters name files."""
+    """Return whether the parameters name parameter files."""
     return isinstance(params.get(FILE_KEY), (str, list))
 
 
 def _usual(declared: ProcessSpec) -> str | None:
-    """Return the name that a known node has where tfcompose cannot give it another."""
+    """Return the default name of a known node that tfcompose cannot rename, or None."""
     preset = preset_of(declared.node)
     run = _run_of(declared)
     if preset is None or not is_node_preset(preset) or (run and run.package):
@@ -536,21 +541,21 @@ def _usual(declared: ProcessSpec) -> str | None:
 
 
 def _run_of(declared: ProcessSpec) -> Run | None:
-    """Return the start of a process as written, completed by its node's preset."""
+    """Return the key ``run``, completed from the preset of the process's node."""
     run, preset = declared.run, preset_of(declared.node)
     if run and run.is_startable:
         return run
     is_otherwise = declared.external or declared.simulate or declared.component
     if is_otherwise or preset is None or not is_node_preset(preset):
         return run
-    known = node_preset(preset)
-    if not known.executable:
+    preset_of_node = node_preset(preset)
+    if not preset_of_node.executable:
         return run
     started = run or Run()
     return started.model_copy(
         update={
-            "package": started.package or known.package,
-            "executable": started.executable or known.executable,
+            "package": started.package or preset_of_node.package,
+            "executable": started.executable or preset_of_node.executable,
         }
     )
 
@@ -558,59 +563,66 @@ def _run_of(declared: ProcessSpec) -> Run | None:
 def nodes_of(
     name: str, declared: ProcessSpec, namespace: str, spec: RobotSpec
 ) -> Finds[tuple[Node, ...]]:
-    """Return the nodes of a process, at least one."""
-    at: Path = ("processes", name)
+    """Return the nodes of the process, at least one."""
+    entry_path: Path = ("processes", name)
     if not declared.nodes:
-        span = spec.span_of((*at, "node")) if declared.node else spec.key_span(at)
+        span = spec.span_of((*entry_path, "node")) if declared.node else spec.key_span(entry_path)
         own_name = name_of(declared.node) or _usual(declared)
         node = full_name(namespace, own_name or name)
-        return (Node(node, span, at, declared.params, declared.lifecycle),)
+        return (Node(node, span, entry_path, declared.params, declared.lifecycle),)
     if declared.publishes:
         message = f"{name} has nodes, and publishes names none of them"
         advice = "write it under one of its nodes"
-        yield finding("TF107", message, spec.key_span((*at, "publishes")), help=advice)
+        yield finding("TF107", message, spec.key_span((*entry_path, "publishes")), help=advice)
     nodes = []
-    for node, own in declared.nodes.items():
-        path = (*at, "nodes", node)
+    for node, node_spec in declared.nodes.items():
+        path = (*entry_path, "nodes", node)
         nodes.append(
-            Node(full_name(namespace, node), spec.key_span(path), path, own.params, own.lifecycle)
+            Node(
+                full_name(namespace, node),
+                spec.key_span(path),
+                path,
+                node_spec.params,
+                node_spec.lifecycle,
+            )
         )
     return tuple(nodes)
 
 
-#: The time of one sweep, in seconds; longer where a joint may not move that fast.
+#: The period of a sweep in seconds. It is longer if the joint's velocity limit requires it.
 PERIOD_S = 6.0
 
 
 def set_positions(draft: Draft) -> Iterator[Finding]:
-    """Let simulated joint states cover every independent joint.
+    """Add a position for every independent joint to simulated joint states.
 
-    A joint that mimics another is omitted: the process computes it. A joint without a position is
-    at 0, or in the middle of its limits if they exclude 0, as in joint_state_publisher.
+    A joint that mimics another joint is omitted, because the simulating process computes it. By
+    default, a joint is at 0, or in the middle of its limits if they exclude 0, as in
+    joint_state_publisher.
     """
     robot, spec = draft.robot, draft.spec
     processes = []
     for process in robot.processes:
         declared = spec.processes.get(process.name)
-        wanted = declared.simulate.joints if declared and declared.simulate else None
+        joints = declared.simulate.joints if declared and declared.simulate else None
         simulation = process.simulate
-        if simulation and simulation.kind == "joints" and wanted is not None:
-            if isinstance(wanted, dict):
-                yield from _wrong_positions(wanted, robot, process, spec)
-            processes.append(replace(process, simulate=_with_joints(simulation, wanted, robot)))
+        if simulation and simulation.kind == "joints" and joints is not None:
+            if isinstance(joints, dict):
+                yield from _wrong_positions(joints, robot, process, spec)
+            processes.append(replace(process, simulate=_with_joints(simulation, joints, robot)))
         else:
             processes.append(process)
     draft.robot = replace(robot, processes=tuple(processes))
 
 
-def _with_joints(simulation: Simulation, wanted: str | dict[str, Any], robot: Robot) -> Simulation:
+def _with_joints(simulation: Simulation, moved: str | dict[str, Any], robot: Robot) -> Simulation:
     joints = {
         edge.joint.name: edge.joint
         for edge in robot.edges
         if edge.joint and _has_position(edge.joint)
     }
     requested: dict[str, Any] = dict.fromkeys(joints)
-    requested |= wanted if isinstance(wanted, dict) else dict.fromkeys(joints, wanted)
+    requested |= moved if isinstance(moved, dict) else dict.fromkeys(joints, moved)
     positions: dict[str, float] = {}
     for name, joint in joints.items():
         position = requested[name]
@@ -625,12 +637,12 @@ def _with_joints(simulation: Simulation, wanted: str | dict[str, Any], robot: Ro
 
 
 def _wrong_positions(
-    wanted: dict[str, Any], robot: Robot, process: Process, spec: RobotSpec
+    positions: dict[str, Any], robot: Robot, process: Process, spec: RobotSpec
 ) -> Iterator[Finding]:
-    """Yield a finding for each joint that is not there, or cannot move as it should."""
+    """Yield a finding for each joint that does not exist or cannot have the position."""
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     movable = [name for name, joint in joints.items() if _has_position(joint)]
-    for name, what in wanted.items():
+    for name, what in positions.items():
         span = spec.key_span(("processes", process.name, "simulate", "joints", name))
         joint = joints.get(name)
         if joint and joint.mimic:
@@ -642,7 +654,7 @@ def _wrong_positions(
                 help=advice,
             )
         elif name not in movable:
-            if not robot.excuses(name):
+            if not robot.tolerates(name):
                 advice = did_you_mean(
                     name,
                     movable,
@@ -660,7 +672,7 @@ def _wrong_positions(
 
 
 def _has_position(joint: Joint) -> bool:
-    """Whether the joint has a single position, and one of its own."""
+    """Return whether the joint has a single independent position."""
     return joint.mimic is None and joint.type in MOVING
 
 
@@ -672,11 +684,10 @@ def _rest(joint: Joint) -> float:
 
 
 def _sweep(joint: Joint) -> Sweep | None:
-    """Return the sweep between the joint's limits, no faster than it may move.
+    """Return the sweep between the joint's limits, within its velocity limit.
 
-    None for a slide without limits.
-
-    Of two limits a missing one is 0, as URDF's readers have it.
+    None for a prismatic joint without limits. A missing lower or upper limit is 0, as in URDF
+    readers.
     """
     limit = joint.limit
     fastest = limit.velocity if limit and limit.velocity else math.inf

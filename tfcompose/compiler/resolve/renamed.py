@@ -1,4 +1,4 @@
-"""A robot under the names that it has as a part of another one."""
+"""A robot with the names that it has as a part of another robot."""
 
 from __future__ import annotations
 
@@ -30,33 +30,33 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of a part's entries in the robot that holds it."""
+    """New names of a part's entries in the including robot."""
 
-    #: The part's name. It is put in front of the names of processes and sensors.
+    #: The part's name, which is prepended to the names of processes and sensors.
     part: str
-    #: Put in front of frames and joints.
+    #: Prefix of the names of frames and joints.
     prefix: str
     #: Frames that keep their names.
     shared: frozenset[str]
-    #: Whether the part has its own ``static`` and ``joints``. Otherwise the holder's publish its
-    #: edges.
+    #: Whether the part has its own ``static`` and ``joints``. Otherwise these processes of the
+    #: including robot publish the part's edges.
     alone: bool
 
     def frame(self, name: str) -> str:
-        """Return the frame's name."""
+        """Return the new name of a frame."""
         return name if name in self.shared else f"{self.prefix}{name}"
 
     def joint(self, name: str) -> str:
-        """Return the joint's name; empty without one."""
+        """Return the new name of a joint; empty for an empty name."""
         return f"{self.prefix}{name}" if name else name
 
     def process(self, name: str) -> str:
-        """Return the name of a process or sensor."""
+        """Return the new name of a process or sensor."""
         return name if name in BUILT_IN and not self.alone else f"{self.part}/{name}"
 
 
 def rename_robot(robot: Robot, names: Names) -> Robot:
-    """Return the robot with the names that it has as a part."""
+    """Return the robot with its names as a part."""
     again = _again(robot, names) if robot.hardware else {}
     kept = [process for process in robot.processes if process.name not in BUILT_IN or names.alone]
     broken = {
@@ -71,6 +71,7 @@ def rename_robot(robot: Robot, names: Names) -> Robot:
         links={names.frame(name): _link(link, names) for name, link in robot.links.items()},
         processes=tuple(_process(process, names) for process in kept if process.kind != "guard"),
         base=robot.base and names.frame(robot.base),
+        ground=robot.ground and names.frame(robot.ground),
         guard=_policy(robot.guard, robot, names),
         sensors=tuple(_sensor(sensor, names) for sensor in robot.sensors),
         claims=tuple(
@@ -102,9 +103,10 @@ def _link(link: Link, names: Names) -> Link:
 
 
 def _shape(shape: Shape, names: Names) -> Shape:
-    """Return the shape with its material's name, which in URDF is one for the whole robot.
+    """Return the shape with a new name for its material.
 
-    Colours name themselves.
+    In URDF, the name of a material applies to the entire robot. A material that is named after its
+    colour keeps its name.
     """
     material = shape.material
     if material is None or material.name.startswith("rgba"):
@@ -136,7 +138,7 @@ def _joint(joint: Joint, names: Names) -> Joint:
 
 
 def _hardware(hardware: Hardware, names: Names, again: dict[str, str]) -> Hardware:
-    """Return the hardware with sensors and gpios under names that no other part has."""
+    """Return the hardware, with sensors and gpios under names that no other part has."""
     inside = (
         replace(
             component, name=names.joint(component.name), params=_params(component.params, again)
@@ -150,12 +152,12 @@ def _hardware(hardware: Hardware, names: Names, again: dict[str, str]) -> Hardwa
 
 
 def _params(params: dict[str, str], again: dict[str, str]) -> dict[str, str]:
-    """Return the parameters; those that name a frame or joint, such as mimic, are renamed."""
+    """Return the parameters. Values that name a frame or a joint get the new name."""
     return {key: again.get(value, value) for key, value in params.items()}
 
 
 def _again(robot: Robot, names: Names) -> dict[str, str]:
-    """Return what frames and joints are called now, by what they were called."""
+    """Return the new names of frames and joints by their old names."""
     again = {frame: names.frame(frame) for frame in robot.frames}
     return again | {
         edge.joint_name: names.joint(edge.joint_name) for edge in robot.edges if edge.joint_name
@@ -178,9 +180,7 @@ def _calibration(calibration: Calibration, names: Names) -> Calibration:
 
 def _process(process: Process, names: Names) -> Process:
     simulate, component = process.simulate, process.component
-    if simulate and not (
-        names.alone or process.part
-    ):  # joint states have the names that joints have in the whole
+    if simulate and not (names.alone or process.part):  # joint states use the new names of joints
         joints = {names.joint(name): q for name, q in simulate.joints.items()}
         sweep = {names.joint(name): how for name, how in simulate.sweep.items()}
         simulate = replace(simulate, joints=joints, sweep=sweep)
@@ -218,9 +218,9 @@ def _zone(zone: Zone, robot: Robot, names: Names) -> Zone:
 
 
 def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
-    """Return the policy with its patterns renamed where they name a frame.
+    """Return the policy with new names in patterns that name a frame.
 
-    Other patterns are as they were.
+    Other patterns do not change.
     """
 
     def final(pattern: str) -> str:
@@ -235,6 +235,6 @@ def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
 
 
 def _names_of(section: str, name: str, names: Names) -> tuple[str, ...]:
-    """Return the names that what an entry should have brought may be looked for under."""
+    """Return the possible new names of a frame or process of a rejected entry."""
     has_process = section in {"sensors", "containers", "processes"}
     return (names.frame(name), names.process(name)) if has_process else (names.frame(name),)

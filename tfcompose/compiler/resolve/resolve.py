@@ -1,6 +1,6 @@
 """Resolution of a robot file into a robot with final names, poses and owners.
 
-``PASSES`` are the steps, in order. A module that only some robots need is imported here on demand.
+``PASSES`` lists the steps in order. Passes import a module on demand if only some robots need it.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from tfcompose.compiler.resolve.processes import (
 from tfcompose.compiler.resolve.rules import limits_of, zones_of
 from tfcompose.compiler.resolve.sensors import add_sensors
 from tfcompose.compiler.resolve.stock import use_stock_publisher
+from tfcompose.compiler.resolve.texts import check_texts
 from tfcompose.compiler.resolve.tool_sections import (
     add_sections,
     as_sections,
@@ -68,9 +69,9 @@ def resolve(
 ) -> tuple[Draft, list[Finding]]:
     """Return the draft with the resolved robot, valid or not, and the findings.
 
-    Presets are expanded, parts joined, poses solved and owners assigned. ``read`` returns the text
-    of a calibration or a part; without ``disk`` meshes and packages are not looked up. ``holder``
-    is the robot that includes this one.
+    Resolution expands presets, joins parts, solves poses and assigns owners. ``read`` returns the
+    text of a calibration or a part. Without ``disk``, meshes and packages are not looked up.
+    ``holder`` is the robot that includes this one.
     """
     collected = holder.collected if holder else Collected()
     draft = Draft(validated, library, read, disk, collected=collected, holder=holder)
@@ -81,7 +82,7 @@ def resolve(
 
 
 def add_processes(draft: Draft) -> Iterator[Finding]:
-    """Take tfcompose's own processes, those of tools, the containers, and the user's."""
+    """Add tfcompose's own processes, processes of tools, containers, and the user's processes."""
     spec = draft.spec
     draft.processes += [*built_in_processes(spec), *([] if draft.holder else own_router(spec))]
     yield from add_sections(draft)
@@ -102,7 +103,7 @@ def add_processes(draft: Draft) -> Iterator[Finding]:
 
 
 def join_parts(draft: Draft) -> Iterator[Finding]:
-    """Resolve the parts, and record their refused entries."""
+    """Resolve the parts, and record their rejected entries."""
     if draft.spec.parts:
         from tfcompose.compiler.resolve.parts import join
 
@@ -110,7 +111,7 @@ def join_parts(draft: Draft) -> Iterator[Finding]:
 
 
 def add_parts(draft: Draft) -> Iterator[Finding]:
-    """Take the frames, edges, bodies and sensors of the parts."""
+    """Add the frames, edges, bodies and sensors of the parts."""
     if draft.joined:
         from tfcompose.compiler.resolve.parts import take
 
@@ -118,7 +119,7 @@ def add_parts(draft: Draft) -> Iterator[Finding]:
 
 
 def measure_mounts(draft: Draft) -> Iterator[Finding]:
-    """Give edges the poses of calibrations."""
+    """Assign the poses of calibrations to edges."""
     mounts = (keys for keys in draft.keys.values() if isinstance(keys, MountKeys))
     if draft.spec.calibrations or any(keys.calibration for keys in mounts):
         from tfcompose.compiler.resolve.calibration import measure
@@ -127,7 +128,7 @@ def measure_mounts(draft: Draft) -> Iterator[Finding]:
 
 
 def assemble(draft: Draft) -> Iterator[Finding]:
-    """Make the robot from the results of the earlier passes."""
+    """Build the robot from the results of the earlier passes."""
     spec, validated = draft.spec, draft.validated
     limits = yield from limits_of(spec)
     parts = [part.robot for part in draft.joined]
@@ -166,6 +167,7 @@ def assemble(draft: Draft) -> Iterator[Finding]:
         part_notes=draft.collected.notes,
         is_variant=spec.spans.is_variant,
         profiles=spec.spans.profiles,
+        overlays=spec.spans.overlays,
         zones=(*zones_of(spec), *(zone for part in in_tree for zone in part.zones)),
         limits=limits,
         conditions=validated.conditions,
@@ -175,7 +177,7 @@ def assemble(draft: Draft) -> Iterator[Finding]:
 
 
 def add_blocks(draft: Draft) -> Iterator[Finding]:
-    """Take the hardware of ros2_control, and raw URDF."""
+    """Add the hardware of ros2_control, and raw URDF."""
     if draft.spec.ros2_control or draft.spec.xml:
         from tfcompose.compiler.resolve.blocks import take_blocks
 
@@ -183,19 +185,33 @@ def add_blocks(draft: Draft) -> Iterator[Finding]:
 
 
 def find_base(draft: Draft) -> Iterator[Finding]:
-    """Find the root of the URDF: as written; base_link, or a fixed base_footprint above it.
+    """Find the root of the URDF.
 
-    Otherwise the only root.
+    This is ``base`` in the file; otherwise base_link, or a fixed base_footprint above it;
+    otherwise the only root.
     """
     robot, base = draft.robot, draft.spec.base
     if base is None:
         base = _usual_base(robot)
     elif base not in robot.frames:
-        if not robot.excuses(base):
-            advice, span = did_you_mean(base, robot.frames), draft.spec.span_of(("base",))
-            yield finding("TF203", f"unknown frame {base}", span, help=advice)
+        yield from _unknown_frame(draft, "base", base)
         base = None
     draft.robot = replace(robot, base=base)
+
+
+def find_ground(draft: Draft) -> Iterator[Finding]:
+    """Find the frame on the floor: as written, or base_footprint (REP-120)."""
+    robot, ground = draft.robot, draft.spec.ground
+    if ground is not None and ground not in robot.frames:
+        yield from _unknown_frame(draft, "ground", ground)
+    usual = ground or "base_footprint"
+    draft.robot = replace(robot, ground=usual if usual in robot.frames else None)
+
+
+def _unknown_frame(draft: Draft, key: str, frame: str) -> Iterator[Finding]:
+    if not draft.robot.tolerates(frame):
+        advice, span = did_you_mean(frame, draft.robot.frames), draft.spec.span_of((key,))
+        yield finding("TF203", f"unknown frame {frame}", span, help=advice)
 
 
 def _usual_base(robot: Robot) -> str | None:
@@ -208,7 +224,7 @@ def _usual_base(robot: Robot) -> str | None:
     return roots[0] if len(roots) == 1 else None
 
 
-#: Each reads what the ones before it left in the draft.
+#: The passes in order. Each pass reads the results of earlier passes from the draft.
 PASSES: tuple[Pass, ...] = (
     add_processes,
     join_parts,
@@ -219,6 +235,7 @@ PASSES: tuple[Pass, ...] = (
     add_parts,
     measure_mounts,
     solve_poses,
+    check_texts,
     check_keys,
     check_names,
     check_waits,
@@ -228,6 +245,7 @@ PASSES: tuple[Pass, ...] = (
     read_param_files,
     add_blocks,
     find_base,
+    find_ground,
     use_stock_publisher,
     isolate,
     settle_claims,
@@ -239,25 +257,26 @@ PASSES: tuple[Pass, ...] = (
 
 
 def _blocks(parts: list[Robot]) -> tuple[Block, ...]:
-    """Return the parts' raw blocks, and once what names nothing of its part.
+    """Return the raw blocks of the parts, with equal blocks only once.
 
-    The plugin of a simulator.
+    Two parts have equal blocks if the blocks name nothing of the part, such as a simulator's
+    plugin.
     """
     blocks: list[Block] = []
     for part in parts:
-        there = {block.text for block in blocks}
-        blocks += [block for block in part.blocks if block.text not in there]
+        texts = {block.text for block in blocks}
+        blocks += [block for block in part.blocks if block.text not in texts]
     return tuple(blocks)
 
 
 def _source_data(draft: Draft) -> dict[str, Any]:
-    """Return what the robot was made from, with what its parts were made from."""
+    """Return the source data of the robot and of its parts."""
     parts = {part.name: part.robot.source_data for part in draft.joined}
     return draft.validated.source_data | ({"in parts": parts} if parts else {})
 
 
 def _guard(declared: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
-    """Return the policy with what the parts allow."""
+    """Return the policy, extended by the policies of the parts."""
     more = (
         pattern for part in parts for pattern in part.guard.allow if pattern not in declared.allow
     )
@@ -265,7 +284,7 @@ def _guard(declared: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
 
 
 def _with_rates(edges: list[Edge], processes: list[Process]) -> tuple[Edge, ...]:
-    """Give moving edges without a rate their process's: that of ``joints``, or of the stand-in."""
+    """Set the rate of moving edges without a declared rate to their owner's rate."""
     rates = {}
     for process in reversed(processes):
         rates[process.name] = process.simulate.rate if process.simulate else process.rate

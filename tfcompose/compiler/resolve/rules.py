@@ -1,4 +1,4 @@
-"""Rules of a robot file, resolved: limits of codes, and zones that sensors must cover."""
+"""The section ``rules``, resolved: limits of codes, and zones that sensors must cover."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve.draft import Finds
     from tfcompose.spec.language.robot import RobotSpec
 
-#: Kinds of limits by their unit in the catalogue: dimension, name, and an example.
+#: Kinds of limits by the limit's unit in the catalogue: dimension, name, and an example.
 _KINDS = {
     "m": (LENGTH, "a length", "5 cm"),
     "rad": (ANGLE, "an angle", "45 deg"),
@@ -23,24 +23,24 @@ _KINDS = {
 
 
 def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
-    """Return the limits that the file sets, in SI by code."""
+    """Return the limits that the file sets, in SI units, by code."""
     limits = {}
     for name, setting in spec.rules.items():
         code = code_of(name)
         if code is None or not isinstance(setting, RuleSpec) or setting.limit is None:
             continue
         span = spec.span_of(("rules", name, "limit"))
-        known = CATALOGUE[code].limit
-        if known is None:
-            others = ", ".join(code.code for code in CATALOGUE.values() if code.limit)
+        limit = CATALOGUE[code].limit
+        if limit is None:
+            limited_codes = ", ".join(code.code for code in CATALOGUE.values() if code.limit)
             yield finding(
                 "TF107",
                 f"{code} {CATALOGUE[code].name} has no limit",
                 span,
-                help=f"these have one: {others}",
+                help=f"these have one: {limited_codes}",
             )
             continue
-        dimension, kind, sample = _KINDS[known[1]]
+        dimension, kind, sample = _KINDS[limit[1]]
         if setting.limit.dimension not in {NUMBER, dimension}:
             message = f"the limit of {code} is {kind}"
             yield finding("TF104", message, span, help=f"for example {sample}")
@@ -50,7 +50,7 @@ def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
 
 
 def zones_of(spec: RobotSpec) -> tuple[Zone, ...]:
-    """Return the zones that sensors of the robot must cover."""
+    """Return the zones that the robot's sensors must cover."""
     return tuple(
         Zone(
             name,

@@ -1,4 +1,4 @@
-"""Sensors on their mounts: the mount edge, inner frames, body and driver of each."""
+"""Sensors: the mount edge, inner frames, body and driver of each sensor."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 def add_sensors(draft: Draft) -> Iterator[Finding]:
-    """Take the sensors, with their mounts, frames, bodies and drivers."""
+    """Add the sensors to the draft, with their mounts, frames, bodies and drivers."""
     spec = draft.spec
     library = yield from _library(draft)
     for name, declared in spec.sensors.items():
@@ -56,7 +56,7 @@ def add_sensors(draft: Draft) -> Iterator[Finding]:
 
 
 def _library(draft: Draft) -> Finds[Library]:
-    """Return the presets, with those in the user's folders before the others."""
+    """Return the presets. Folders from the robot file take precedence."""
     folders = []
     for index, named in enumerate(draft.spec.preset_path):
         span = draft.spec.span_of(("preset_path", index))
@@ -70,22 +70,22 @@ def _library(draft: Draft) -> Finds[Library]:
 
 @dataclass(frozen=True, slots=True)
 class _Mounting:
-    """One sensor on its way into the draft."""
+    """Adds a sensor to the draft."""
 
     draft: Draft
     sensor: Sensor
     unknown: dict[str, str] = field(default_factory=dict)
 
     def add(self) -> Iterator[Finding]:
-        """Take the sensor."""
+        """Add the sensor to the draft."""
         draft, sensor = self.draft, self.sensor
         mount = self.rename(sensor.fill_name(sensor.preset.mount))
         draft.frames.setdefault(mount, self.span_of())
         keys, path = sensor.spec, ("sensors", sensor.name)
         yield from add_edge(draft, path, mount, keys, joint_name=keys.joint, sensor=sensor.name)
-        others = len(draft.processes)
+        count_before = len(draft.processes)
         publisher = yield from self.publisher()
-        driver = sensor.name if len(draft.processes) > others else ""
+        driver = sensor.name if len(draft.processes) > count_before else ""
         for name, frame in sensor.frames().items():
             yield from self.add_frame(name, frame, publisher)
         yield from self.report_unknown()
@@ -95,27 +95,34 @@ class _Mounting:
         draft.sensors.append(mounted)
 
     def span_of(self, *keys: str) -> Span:
-        """Return the place of the sensor, or of the value of a key in it."""
+        """Return the span of the sensor's name, or of the value of a key."""
         path: Path = ("sensors", self.sensor.name, *keys)
         return self.draft.spec.span_of(path) if keys else self.draft.spec.key_span(path)
 
     def rename(self, name: str) -> str:
-        own = self.sensor.spec.frames.get(name)
-        return own.name if own and own.name else name
+        override = self.sensor.spec.frames.get(name)
+        return override.name if override and override.name else name
 
     def add_frame(self, name: str, frame: PresetFrame, publisher: str) -> Iterator[Finding]:
-        """Take one frame inside the sensor: the unit's own value before the preset's."""
-        own, final = self.sensor.spec.frames.get(name), self.rename(name)
+        """Add a frame inside the sensor.
+
+        Values in the robot file override values of the preset.
+        """
+        override, final = self.sensor.spec.frames.get(name), self.rename(name)
         parent = self.sensor.parent_of(name, frame)
         owner = publisher if frame.driver else STATIC
-        pose, missing = self.pose_of(name, frame, own)
+        pose, missing = self.pose_of(name, frame, override)
         if missing and owner == STATIC:
             self.unknown[name] = f"{name}: {{{', '.join(missing)}}}"
         kind = "dynamic" if frame.driver == "dynamic" and owner != STATIC else "static"
         self.draft.frames.setdefault(final, self.span_of())
-        nominal = frame.nominal and not (own and (own.xyz or rotation_of(own, name)))
+        nominal = frame.nominal and not (
+            override and (override.xyz or rotation_of(override, name))
+        )
         path: Path = ("sensors", self.sensor.name, "frames", name)
-        joint_at = yield from add_joint_name(self.draft, own.joint if own else None, path)
+        joint_at = yield from add_joint_name(
+            self.draft, override.joint if override else None, path
+        )
         edge = Edge(
             parent=self.rename(parent),
             child=final,
@@ -128,48 +135,48 @@ class _Mounting:
             nominal=nominal,
             other_axes=frame.other_axes,
             pose_known=not missing,
-            joint_name=(own.joint if own else None) or "",
+            joint_name=(override.joint if override else None) or "",
             joint_at=joint_at,
             entry=path,
         )
         self.draft.edges.append(edge)
 
     def pose_of(
-        self, name: str, frame: PresetFrame, own: FrameOverride | None
+        self, name: str, frame: PresetFrame, override: FrameOverride | None
     ) -> tuple[Pose, list[str]]:
-        """Return the frame's pose in its parent, and what is missing of it.
+        """Return the frame's pose in its parent, and the keys that are missing for it.
 
-        Then it is the identity.
+        If keys are missing, the pose is the identity.
         """
-        at, rotation = frame.xyz, rotation_of(frame, name)
+        translation, rotation = frame.xyz, rotation_of(frame, name)
         if frame.by_driver and self.sensor.tf == DRIVER:
-            at, rotation = (
-                frame.by_driver.xyz or at,
+            translation, rotation = (
+                frame.by_driver.xyz or translation,
                 rotation_of(frame.by_driver, name) or rotation,
             )
-        turned = rotation_of(own, name) if own else None
-        xyz = (own.xyz if own else None) or at
+        turned = rotation_of(override, name) if override else None
+        xyz = (override.xyz if override else None) or translation
         missing = ["xyz: [x, y, z]"] if xyz is None else []
-        if at is None and rotation is None and turned is None:
+        if translation is None and rotation is None and turned is None:
             missing.append("rpy: [roll, pitch, yaw]")
         if xyz is None or missing:
             return Pose(), missing
         return Pose(xyz, turned or rotation or Pose().quat_xyzw), []
 
     def report_unknown(self) -> Iterator[Finding]:
-        """Yield a finding for the frames of unknown pose, with the keys to write."""
+        """Yield a finding that names the frames with unknown poses, and the keys to write."""
         if self.unknown:
             sensor, first = self.sensor, next(iter(self.unknown))
-            *others, last = self.unknown
-            names = f"{', '.join(others)} and {last}" if others else last
-            parent = "" if others else f" in {sensor.parent_of(first, sensor.frames()[first])}"
+            *leading, last = self.unknown
+            names = f"{', '.join(leading)} and {last}" if leading else last
+            parent = "" if leading else f" in {sensor.parent_of(first, sensor.frames()[first])}"
             message = f"{sensor.spec.preset} has no pose of {names}{parent}"
             frames = ", ".join(self.unknown.values())
             advice = f"measure, and write: sensors: {{{sensor.name}: {{frames: {{{frames}}}}}}}"
             yield finding("TF605", message, self.span_of("preset"), help=advice)
 
     def publisher(self) -> Finds[str]:
-        """Return who publishes the frames inside the sensor that a driver can publish."""
+        """Return the publisher of the inner frames that the driver can publish."""
         sensor, declared, driver = self.sensor, self.sensor.spec, self.sensor.preset.driver
         named = declared.driver.process if declared.driver else None
         process, findings = driver_process(sensor, self.draft.validated)
@@ -203,7 +210,7 @@ class _Mounting:
         return STATIC
 
     def mount(self, mount: str, driver: str) -> Finds[MountedSensor]:
-        """Return what the rules see of the sensor."""
+        """Return the mounted sensor for the rules."""
         sensor, declared, preset = self.sensor, self.sensor.spec, self.sensor.preset
         named = declared.driver.process if declared.driver else None
         serial = next(
@@ -245,16 +252,16 @@ class _Mounting:
     def check_overrides(self, mount: str) -> Iterator[Finding]:
         sensor, spec = self.sensor, self.draft.spec
         original = sensor.fill_name(sensor.preset.mount)
-        known = [*sensor.frames(), original]
+        frames = [*sensor.frames(), original]
         path: Path = ("sensors", sensor.name, "frames")
-        for name, own in sensor.spec.frames.items():
+        for name, override in sensor.spec.frames.items():
             span = spec.key_span((*path, name))
-            if name not in known:
-                advice = did_you_mean(name, known, f"its frames: {', '.join(known)}")
+            if name not in frames:
+                advice = did_you_mean(name, frames, f"its frames: {', '.join(frames)}")
                 yield finding("TF203", f"{sensor.name} has no frame {name}", span, help=advice)
-            elif own.parent and own.parent not in known:
-                advice = did_you_mean(own.parent, known, f"its frames: {', '.join(known)}")
-                message = f"{sensor.name} has no frame {own.parent}"
+            elif override.parent and override.parent not in frames:
+                advice = did_you_mean(override.parent, frames, f"its frames: {', '.join(frames)}")
+                message = f"{sensor.name} has no frame {override.parent}"
                 yield finding("TF203", message, spec.span_of((*path, name, "parent")), help=advice)
         mounted = sensor.spec.frames.get(original)
         if mounted and (mounted.xyz or mounted.parent or mounted.joint or rotation_of(mounted)):
@@ -283,17 +290,17 @@ def _has_driven_frames(sensor: Sensor) -> bool:
     return any(frame.driver for frame in sensor.preset.frames.values())
 
 
-#: Keys that a driver's further processes inherit from its first.
+#: Keys that the additional processes of a driver inherit from its first process.
 _INHERITED = frozenset({"host", *(row.name for row in PROCESS_KEYS if row.is_shared)})
-#: In an argument, the file that holds the parameters of a process.
+#: Placeholder, in an argument, for the parameter file of a process.
 PARAMS_FILE = "${params_file}"
 
 
 def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None, list[Finding]]:
-    """Return the process of a sensor's driver with the parameters that the spec implies.
+    """Return the process of a sensor's driver, with the parameters that the sensor needs.
 
-    It is the preset's, overridden by the user's keys; the user's alone if the preset has none; or
-    None.
+    The process is the preset's, overridden by the user's keys. If the preset has no driver, it is
+    the user's process, or None.
     """
     driver, declared = sensor.preset.driver, sensor.spec.driver
     spec = validated.spec
@@ -356,7 +363,10 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
 
 
 def _says_not_how(name: str, validated: Validated) -> Iterator[Finding]:
-    """Yield a finding about a driver that does not say how it runs, unless refused."""
+    """Yield a finding about a driver that does not define how it runs.
+
+    A driver whose key was rejected is not reported.
+    """
     path: Path = ("sensors", name, "driver")
     if not {(*path, "component"), (*path, "container")} & validated.refused:
         advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, or external: true"
@@ -366,7 +376,7 @@ def _says_not_how(name: str, validated: Validated) -> Iterator[Finding]:
 
 
 def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
-    """Yield the additional processes of a sensor's driver, if its preset starts it."""
+    """Yield the additional processes of a driver, if the preset's driver is started."""
     driver, declared = sensor.preset.driver, sensor.spec.driver
     if driver is None or (
         declared and (declared.process or declared.run or declared.external or declared.simulate)
@@ -412,19 +422,19 @@ def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
 def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
     """Return the full name of the driver's node."""
     driver, declared = sensor.preset.driver, sensor.spec.driver
-    own = (
+    node_name = (
         f"{sensor.fill_name(driver.namespace)}/{sensor.fill_name(driver.node)}".strip("/")
         if driver
         else sensor.name
     )
     namespace = namespace_of(declared, spec.ros.namespace)
     return full_name(
-        namespace, (declared.node.name if declared and declared.node else None) or own
+        namespace, (declared.node.name if declared and declared.node else None) or node_name
     )
 
 
 def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
-    """Return the driver's parameters or launch arguments that implement the spec."""
+    """Return the driver's parameters or launch arguments that follow from the sensor's entry."""
     driver = sensor.preset.driver
     if driver is None:
         return {}
@@ -444,19 +454,21 @@ def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
 def claims_of(sensor: Sensor) -> tuple[DriverClaim, ...]:
     """Return the edges outside the sensor that its driver publishes by default.
 
-    The mount is not among them.
+    The mount edge is not included.
     """
     driver, declared = sensor.preset.driver, sensor.spec
-    own = {sensor.name, declared.driver.process if declared.driver else None}
-    return () if driver is None or (declared.owner and declared.owner in own) else driver.claims
+    drivers = {sensor.name, declared.driver.process if declared.driver else None}
+    return (
+        () if driver is None or (declared.owner and declared.owner in drivers) else driver.claims
+    )
 
 
 def _node_parameters(
     sensor: Sensor, computed: dict[str, Any], *, launched: bool
 ) -> dict[str, Any]:
-    """Return the node's own parameters.
+    """Return the parameters of the driver's node.
 
-    A launch file takes arguments, and may pass a file of parameters on.
+    A launch file takes arguments instead, and may pass on a parameter file.
     """
     driver = sensor.preset.driver
     if driver is None or not driver.launch:
@@ -465,10 +477,12 @@ def _node_parameters(
 
 
 def _frame_names(sensor: Sensor, driver: PresetDriver) -> dict[str, str]:
-    """Return the parameters that name frames, as ``${frame(…)}``, for frames that exist."""
+    """Return the parameters that name frames, as ``${frame(…)}``, for existing frames."""
     inside = {sensor.fill_name(sensor.preset.mount), *sensor.frames()}
     frames = {key: sensor.fill_name(frame) for key, frame in driver.naming.items()}
-    renamed = {name: own.name for name, own in sensor.spec.frames.items() if own.name}
+    renamed = {
+        name: override.name for name, override in sensor.spec.frames.items() if override.name
+    }
     return {
         sensor.fill_name(key): f"${{frame({renamed.get(frame, frame)})}}"
         for key, frame in frames.items()
@@ -477,7 +491,7 @@ def _frame_names(sensor: Sensor, driver: PresetDriver) -> dict[str, str]:
 
 
 class _SensorFiller:
-    """Fills a driver's parameters for one sensor; what ends up empty or undecided is left out."""
+    """Fills in a driver's parameters for a sensor. Parameters without a value are left out."""
 
     def __init__(self, sensor: Sensor, prefix: str) -> None:
         self.sensor = sensor
@@ -500,7 +514,7 @@ class _SensorFiller:
 
 
 def arguments(values: dict[str, Any]) -> list[str]:
-    """Return the values as arguments of a launch file."""
+    """Return the values as arguments of a launch file, NAME:=VALUE."""
     return [f"{key}:={_plain(value)}" for key, value in values.items()]
 
 
@@ -509,7 +523,7 @@ def _plain(value: Any) -> str:
 
 
 def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
-    """Yield findings about names that the driver makes itself, against the spec."""
+    """Yield findings about names and parameters that the driver does not accept."""
     driver, declared = sensor.preset.driver, sensor.spec
     if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
         return
@@ -520,15 +534,15 @@ def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
         for topic in sensor.preset.topics.values()
         if sensor.holds(topic.when)
     }
-    own = (stamped | ({*sensor.driver_frames()} if sensor.tf == DRIVER else set())) - named
+    frames = (stamped | ({*sensor.driver_frames()} if sensor.tf == DRIVER else set())) - named
     path: Path = ("sensors", sensor.name)
     for name in sorted(
-        own & {frame for frame, described in declared.frames.items() if described.name}
+        frames & {frame for frame, described in declared.frames.items() if described.name}
     ):
-        wanted = declared.frames[name].name
+        declared_name = declared.frames[name].name
         message = (
             f"the driver of {declared.preset} makes the name {name} itself, and cannot call it"
-            f" {wanted}"
+            f" {declared_name}"
         )
         span = spec.span_of((*path, "frames", name, "name"))
         advice = f"rename the sensor {sensor.name}, or keep the name"
@@ -536,7 +550,7 @@ def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
     if (
         settings.frame_prefix
         and not driver.prefixed
-        and own & {*sensor.frames(), sensor.fill_name(sensor.preset.mount)}
+        and frames & {*sensor.frames(), sensor.fill_name(sensor.preset.mount)}
     ):
         message = (
             f"the driver of {declared.preset} cannot write {settings.frame_prefix} in front of its"
@@ -555,27 +569,27 @@ def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
         yield finding("TF604", message, span, help="driver: {run: {package: …, executable: …}}")
 
 
-#: Words for no driver that YAML 1.2 reads as strings.
+#: Words that a user may write for "no driver" and that YAML 1.2 reads as strings.
 OFF = frozenset({"off", "Off", "OFF", "no", "No", "NO", "null", "None", "NONE", "disabled"})
 
 
 def _check_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[Finding]:
     """Yield findings about a driver that is the name of a process.
 
-    It must be one, and has its own keys.
+    The process must exist. Other keys belong under the process, not under the driver.
     """
     path: Path = ("sensors", sensor.name, "driver")
     spec = validated.spec
     broken = (entry for section, entry in validated.broken if section in {"processes", "sensors"})
-    known = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
-    if name != "none" and name not in known:
+    names = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
+    if name != "none" and name not in names:
         declare = f"processes: {{{name}: {{external: true}}}}"
         otherwise = (
             f"leave driver out to start that of the preset; or {declare}"
             if sensor.preset.driver
             else declare
         )
-        advice = did_you_mean(name, known, otherwise)
+        advice = did_you_mean(name, names, otherwise)
         if name in OFF:
             advice = "driver: none starts no driver"
         message = f"the driver of {sensor.name} is {name}, which is not a process"
@@ -590,7 +604,7 @@ def _check_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[F
 def _check_parameters(
     sensor: Sensor, computed: dict[str, Any], spec: RobotSpec
 ) -> Iterator[Finding]:
-    """Yield a finding for each parameter that the user gives and tfcompose computes."""
+    """Yield a finding for each parameter that the user sets and tfcompose computes."""
     for key in sensor.spec.driver.params if sensor.spec.driver else ():
         if key in computed:
             message = (

@@ -1,9 +1,9 @@
-"""A stock robot_state_publisher instead of tfcompose's own.
+"""A stock robot_state_publisher instead of tfcompose's ``joints``.
 
-It publishes the fixed edges and joints of its URDF. Facts of robot_state_publisher 3.3 (ROS 2
-Jazzy): fixed joints go to /tf_static, moving ones follow ``joint_states``, floating ones are
-skipped; ``frame_prefix`` is put in front of every frame; it passes on joint states at most
-``publish_frequency`` times a second, 20 by default; it also publishes ``robot_description``.
+It publishes the fixed edges and joints of its URDF. robot_state_publisher 3.3 (ROS 2 Jazzy)
+publishes fixed joints on /tf_static and moving joints by ``joint_states``, and skips floating
+joints. It prepends ``frame_prefix`` to every frame. It passes on joint states at most
+``publish_frequency`` times a second, 20 by default. It also publishes ``robot_description``.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def use_stock_publisher(draft: Draft) -> Iterator[Finding]:
 
 
 def stock_faults(robot: Robot) -> Iterator[Finding]:
-    """Yield findings about the joints and frames that a stock publisher cannot send correctly."""
+    """Yield findings about joints and frames that a stock publisher cannot publish correctly."""
     described = robot.described_frames()
     for edge in robot.edges:
         if (
@@ -59,7 +59,7 @@ def stock_faults(robot: Robot) -> Iterator[Finding]:
 def with_stock(robot: Robot) -> Robot:
     """Return the robot with a stock publisher as ``joints``.
 
-    Fixed edges elsewhere stay with ``static``, which then sends the description too.
+    ``static`` keeps the fixed edges outside the URDF, and also publishes the description.
     """
     below = robot.described_frames() - {robot.base}
     edges = []
@@ -75,7 +75,10 @@ def with_stock(robot: Robot) -> Robot:
 
 
 def _stock(joints: Process, robot: Robot) -> Process:
-    """Return the process with its own description; the topic for it is remapped away."""
+    """Return the process of the stock publisher, with its own URDF.
+
+    Its topic ``robot_description`` is remapped, because ``static`` publishes the description.
+    """
     params = {"publish_frequency": MOST_HZ} | joints.params
     params["publish_frequency"] = min(float(params["publish_frequency"]), MOST_HZ)
     prefix = {"frame_prefix": robot.ros.frame_prefix} if robot.ros.frame_prefix else {}

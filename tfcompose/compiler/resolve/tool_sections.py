@@ -1,4 +1,4 @@
-"""Hooks of tools that have sections in a robot file: added processes and checks."""
+"""Hooks of tools that have sections in a robot file: additional processes and checks."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ToolSection:
-    """A tool's section of a robot file, as the tool's hooks get it."""
+    """A tool's section of a robot file, as the hooks of the tool receive it."""
 
     key: Key
-    #: The section's value, validated by the key's model.
+    #: The section's value, validated with the key's model.
     value: Any
-    #: The whole file with its spans.
+    #: The complete robot file with its spans.
     spec: RobotSpec
-    #: Return the text of a file or raise RejectedError. None: no file can be read.
+    #: Returns the text of a file or raises RejectedError. None if files cannot be read.
     read: Callable[[str], str] | None
 
     def span_of(self, *path: str | int) -> Span:
-        """Return the place of a value in the section, or of the nearest enclosing one."""
+        """Return the span of a value in the section, or of the nearest enclosing value."""
         return self.spec.span_of((self.key.name, *path))
 
     def key_span(self, *path: str | int) -> Span:
-        """Return the place of a key in the section, or of the nearest enclosing one."""
+        """Return the span of a key in the section, or of the nearest enclosing key."""
         return self.spec.key_span((self.key.name, *path))
 
 
 def sections_of(draft: Draft) -> list[ToolSection]:
-    """Return the sections of tools in a robot file, without refused ones.
+    """Return the sections of tools in a robot file, without rejected sections.
 
-    Those of a part have no effect.
+    Sections in the file of a part have no effect.
     """
     spec = draft.spec
     keys = keys_in(spec.model_fields_set) if draft.holder is None else []
@@ -66,9 +66,9 @@ def as_sections(draft: Draft) -> dict[str, Section]:
 
 
 def add_sections(draft: Draft) -> Iterator[Finding]:
-    """Take the processes that tools add, with their keys from ``processes``.
+    """Add the processes of tools, with the keys under their names in ``processes``.
 
-    If the entry under its name says how the process runs, the entry replaces it.
+    If such an entry defines how its process runs, that process replaces the tool's.
     """
     for section in sections_of(draft):
         processes = yield from _hook(section, section.key.processes)
@@ -83,16 +83,16 @@ def add_sections(draft: Draft) -> Iterator[Finding]:
 
 
 def check_sections(draft: Draft) -> Iterator[Finding]:
-    """Yield the tools' findings about their sections and the files named there."""
+    """Yield the findings of tools about their sections and the files named there."""
     for section in sections_of(draft):
         findings = yield from _hook(section, section.key.check, draft.robot)
         yield from findings
 
 
 def _hook(section: ToolSection, reference: str, *more: Any) -> Finds[list[Any]]:
-    """Return what a tool's function returns.
+    """Return the result of a tool's function.
 
-    Nothing where it has none, and a finding where it crashes.
+    Empty if the tool has no such function. If the function crashes, that is a finding.
     """
     if not reference:
         return []

@@ -1,6 +1,6 @@
-"""URDF and xacro, both ways: text to a ``Robot``, a ``Robot`` to text.
+"""URDF and xacro: text to a ``Robot``, and a ``Robot`` to text.
 
-``read`` returns elements with their spans, ``convert`` makes a robot of them, ``lint`` reports on
-a file; ``write`` and ``macro`` write a robot, ``read_back`` compares the result with it.
-``expand`` runs xacro in a separate process, ``xacro_process``.
+``read`` returns XML elements with their spans, ``convert`` turns them into a robot, and ``lint``
+reports on a file. ``write`` and ``macro`` write a robot, and ``read_back`` compares the written
+text with the robot. ``expand`` runs xacro in a separate process, ``xacro_process``.
 """

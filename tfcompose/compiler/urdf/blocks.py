@@ -1,7 +1,8 @@
-"""Raw blocks: elements kept verbatim, and the parts of the robot that they name.
+"""Raw blocks: XML elements kept verbatim, and the links and joints that they name.
 
-A block is read as the content of a ``<robot>`` tag on a line before it; places are those in that
-document. A ``<ros2_control>`` element becomes a hardware component if that keeps everything in it.
+A block is read as the content of a ``<robot>`` element whose tag is on a line before the block.
+Spans refer to that document. A ``<ros2_control>`` element becomes a hardware component if no
+content of the element is lost.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ if TYPE_CHECKING:
 
 #: Elements that name links or joints of the robot.
 REFERRING = frozenset({"gazebo", "transmission", "ros2_control"})
-#: Elements allowed in a block, besides extensions with their own prefix.
+#: Elements allowed in a block, in addition to elements with a namespace prefix.
 _ALLOWED = ("transmission", "gazebo", "ros2_control", "sensor", "material")
-#: Elements that belong in a section of the robot file, and those that belong in another element.
+#: Elements that do not belong in a block, with the section of the robot file for each.
 _SECTIONS = {"link": "links", "joint": "joints", "robot": "include"}
 _INNER = frozenset(
     {"visual", "collision", "inertial", "origin", "geometry", "limit", "mimic", "axis", "plugin"}
 )
-#: The largest number of joints that a finding about a wrong one names.
+#: Maximum number of joints that a finding about an unknown joint lists.
 _MOST_NAMED = 8
 _SUBSTITUTION = re.compile(
     r"\$\((?:find|find-pkg-share|arg|var|env|optenv|eval|dirname|cwd)\b[^()\n<>]*\)"
@@ -41,7 +42,7 @@ _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 
 
 def read_block(text: str, file: str, *, with_text: bool = False) -> Element:
-    """Return the ``<robot>`` with the elements of the block.
+    """Return the ``<robot>`` element with the elements of the block.
 
     Arguments and exceptions are those of ``read_xml``.
     """
@@ -76,17 +77,17 @@ def faults_of(
 
 
 def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
-    """Yield a finding for each prefix that no element around it declares.
+    """Yield a finding for each namespace prefix that no enclosing element declares.
 
-    Xacro, and other readers, stop there.
+    Xacro and other XML readers reject such a prefix.
     """
     waiting = [(top, frozenset({"xml", "xmlns"}))]
     while waiting:
-        element, known = waiting.pop()
-        known |= {name[6:] for name in element.attributes if name.startswith("xmlns:")}
+        element, properties = waiting.pop()
+        properties |= {name[6:] for name in element.attributes if name.startswith("xmlns:")}
         for name in (element.tag, *element.attributes):
             prefix, colon, _ = name.partition(":")
-            if colon and prefix not in known:
+            if colon and prefix not in properties:
                 advice = f'<{element.tag} xmlns:{prefix}="http://…">'
                 yield finding(
                     "TF719",
@@ -94,7 +95,7 @@ def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
                     element.span,
                     help=advice,
                 )
-        waiting += [(child, known) for child in element.children]
+        waiting += [(child, properties) for child in element.children]
 
 
 def find_unexpanded(text: str, file: str) -> Iterator[Finding]:
@@ -118,7 +119,7 @@ def _blank(comment: re.Match[str]) -> str:
 def unknown_references(
     element: Element, frames: Collection[str], joints: Collection[str]
 ) -> Iterator[Finding]:
-    """Yield a finding for each link or joint that a block names and the robot lacks."""
+    """Yield a finding for each link or joint that a block names and the robot does not have."""
     reference = element.attributes.get("reference")
     if (
         element.tag == "gazebo"
@@ -141,14 +142,14 @@ def unknown_references(
 
 
 def unknown_joint(name: str, span: Span, joints: Collection[str]) -> Finding:
-    """Return the finding that none of ``joints``, the moving ones, has this name."""
-    there = f"the robot has {list_names(joints, _MOST_NAMED)}"
-    advice = did_you_mean(name, joints, there if joints else "no joint of the robot moves")
+    """Return the finding that the moving ``joints`` do not include this name."""
+    listing = f"the robot has {list_names(joints, _MOST_NAMED)}"
+    advice = did_you_mean(name, joints, listing if joints else "no joint of the robot moves")
     return finding("TF703", f"no moving joint {name}", span, help=advice)
 
 
 def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
-    """Yield a finding for each hardware joint that is not a moving joint of the robot."""
+    """Yield a finding for each joint of the hardware that is not a moving joint of the robot."""
     for system in hardware:
         for component in system.components:
             if component.kind == "joint" and component.name not in joints:
@@ -158,9 +159,9 @@ def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> I
 def within(
     block: Block, robot: Robot, frames: Collection[str], joints: Collection[str]
 ) -> Block | None:
-    """Return the block of a robot without elements about other frames and joints.
+    """Return the block without elements that refer to the robot's other frames and joints.
 
-    Elements that name no frame and no joint are kept. None: no element is left.
+    Elements that name no frame and no joint are kept. None if no element is left.
     """
     elements = read_block(block.text, robot.file).children
     all_joints = {edge.joint_name for edge in robot.edges}
@@ -176,9 +177,9 @@ def within(
 
 
 def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
-    """Return the hardware with only these of its joints.
+    """Return the hardware with only the given joints.
 
-    None if it had joints and none is left.
+    None if the hardware had joints and none is left.
     """
     left = tuple(
         component
@@ -195,7 +196,7 @@ def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
 
 # ros2_control.
 
-#: Attributes that ros2_control reads from an interface, rather than parameters.
+#: Attributes of an interface that are not parameters.
 ATTRIBUTES = ("data_type", "size")
 _TYPES = ("system", "actuator", "sensor")
 _KINDS = ("joint", "sensor", "gpio")
@@ -203,11 +204,11 @@ _INTERFACES = ("command_interface", "state_interface")
 
 
 class _UnsupportedError(Exception):
-    """A hardware component cannot say something that is in the element."""
+    """A hardware component cannot represent some content of the element."""
 
 
 def with_hardware(robot: Robot) -> Robot:
-    """Return the robot of a URDF with ros2_control blocks as hardware, if that is lossless."""
+    """Return the robot of a URDF with ros2_control blocks turned into hardware, if lossless."""
     hardware: dict[str, Hardware] = {}
     blocks = []
     for block in robot.blocks:
@@ -227,7 +228,7 @@ def with_hardware(robot: Robot) -> Robot:
 
 
 def _hardware_of(element: Element, block: Block) -> Hardware | None:
-    """Return the hardware component that the element describes, or None if it says more."""
+    """Return the hardware that the element describes, None if it cannot represent the element."""
     try:
         return _hardware(element, block)
     except (_UnsupportedError, ValueError):
@@ -304,7 +305,7 @@ def _params(element: Element) -> dict[str, str]:
 
 
 def _only(element: Element, *attributes: str, tags: tuple[str, ...] = ()) -> dict[str, str]:
-    """Return the element's attributes, if it has no others and no other elements in it."""
+    """Return the element's attributes, or raise if it has other attributes or elements."""
     if set(element.attributes) - set(attributes) or {
         child.tag for child in element.children
     } - set(tags):

@@ -1,6 +1,6 @@
-"""Conversion of URDF elements to a robot, with places in the URDF file.
+"""Conversion of URDF elements to a robot, with spans in the URDF file.
 
-Faults in the file are findings.
+Errors in the file become findings.
 """
 
 from __future__ import annotations
@@ -62,30 +62,31 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
     from tfcompose.foundation.geometry import Vector
 
-    #: Takes the address of a file, its place, and the document's file; returns the file, and what
-    #: is wrong with the address, if anything is.
+    #: Takes the address of a file, its span, and the file of the document. Returns the file, and a
+    #: finding if the address is wrong.
     Finder = Callable[[str, Span, str], tuple[Asset, Finding | None]]
 
 _MOST_OF_A_BYTE = 255
 
-#: The elements that become links and joints; all others below <robot> are kept verbatim.
+#: Elements that become links, joints and materials. All other elements below <robot> are kept
+#: verbatim.
 _CONVERTED = frozenset({"link", "joint", "material"})
 
 T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)
-#: Their numbers are upper or lower bounds: an infinite one is no error, it bounds nothing.
+#: Classes whose numbers are upper or lower bounds. An infinite bound is valid and means no limit.
 _BOUNDS = (Limit, SafetyController)
 
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """The robot that a URDF describes, valid or not, and the findings from reading it."""
+    """The robot that a URDF describes, valid or not, and the findings of the conversion."""
 
     robot: Robot
-    #: About links and joints.
+    #: Findings about links and joints.
     of_elements: tuple[Finding, ...]
-    #: About elements that are kept verbatim.
+    #: Findings about elements that are kept verbatim.
     of_blocks: tuple[Finding, ...]
-    #: About meshes and textures. A file that is missing here may exist on another computer.
+    #: Findings about meshes and textures. A missing file may exist on another computer.
     of_files: tuple[Finding, ...]
 
     @property
@@ -97,11 +98,11 @@ class Converted:
 def robot_of(root: Element, file: str, find: Finder, included: Collection[str] = ()) -> Converted:
     """Return the robot that the URDF describes.
 
-    ``find`` looks up the files of meshes and textures. ``included`` are further files that its
-    elements come from.
+    ``find`` looks up the files of meshes and textures. ``included`` are further files that contain
+    elements of the URDF.
 
     Raises:
-        RejectedError: if it is no URDF.
+        RejectedError: if the document is not a URDF.
     """
     if root.tag != "robot":
         message = f"the root element is <{root.tag}>, not <robot>"
@@ -148,7 +149,7 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
 
 
 def _source_numbers(root: Element) -> Iterator[SourceNumbers]:
-    """Yield the numbers of the origins of joints and bodies, and of the limits of joints."""
+    """Yield the numbers of the origins of joints and bodies, and of the joints' limits."""
     for joint in root.all("joint"):
         path = ("joints", joint.attributes.get("name", ""))
         yield from _numbers_of(joint.first("origin"), path, ("xyz", "rpy"))
@@ -164,7 +165,7 @@ def _source_numbers(root: Element) -> Iterator[SourceNumbers]:
 def _numbers_of(
     element: Element | None, path: tuple[str, str], names: tuple[str, ...]
 ) -> Iterator[SourceNumbers]:
-    """Yield the numbers of an element's attributes; other values are findings already."""
+    """Yield the numbers of an element's attributes. Invalid values are already findings."""
     if element is None:
         return
     for name in names:
@@ -179,19 +180,19 @@ def _numbers_of(
 
 
 def _value_place(element: Element, name: str, _index: int) -> Span:
-    """Return the place of an attribute's value: with xacro its numbers may stand nowhere."""
+    """Return the span of an attribute's value. With xacro, its numbers may be in no file."""
     return element.value_span(name)
 
 
 def _by_name(
     elements: list[Element], values: AttributeReader, severity: Severity = "error"
 ) -> dict[str, Element]:
-    """Return the elements by their names; a second one of a name is a finding."""
-    known: dict[str, Element] = {}
+    """Return the elements by name. A repeated name is a finding."""
+    by_name: dict[str, Element] = {}
     for element in elements:
         name = values.text(element, "name", f'<{element.tag} name="…">')
-        if name in known:
-            note = Note("first defined here", known[name].value_span("name"))
+        if name in by_name:
+            note = Note("first defined here", by_name[name].value_span("name"))
             message = f"duplicate {element.tag} name {name}"
             advice = "remove it: ROS parsers reject the robot"
             advice = "rename one of them" if severity == "error" else advice
@@ -200,8 +201,8 @@ def _by_name(
                 finding("TF722", message, span, notes=[note], help=advice, severity=severity)
             )
         elif name:
-            known[name] = element
-    return known
+            by_name[name] = element
+    return by_name
 
 
 def _blocks(root: Element) -> Iterator[Block]:
@@ -220,7 +221,7 @@ def _blocks(root: Element) -> Iterator[Block]:
 
 
 def _with_namespaces(element: Element, root: Element) -> str:
-    """Return the element's source text, with the namespaces that it takes from the root."""
+    """Return the source text of the element, with namespace declarations from the root."""
     raw = element.raw
     spaces = {name: value for name, value in root.attributes.items() if name.startswith("xmlns:")}
     used = [name for name in spaces if re.search(rf"[<\s]{re.escape(name[6:])}:", raw)]
@@ -232,12 +233,12 @@ def _with_namespaces(element: Element, root: Element) -> str:
 
 
 def _edge(element: Element, values: AttributeReader) -> Edge | None:
-    """Return the edge that a joint is, or None where it has no parent or no child."""
+    """Return the edge of a joint, None for a joint without parent or child."""
     name, kind = element.attributes.get("name", ""), values.text(element, "type", 'type="fixed"')
     if kind and kind not in JOINT_TYPES:
         advice = did_you_mean(kind, JOINT_TYPES, f"one of: {', '.join(JOINT_TYPES)}")
         values.refuse(f"unknown joint type {kind}", element.value_span("type"), advice)
-        # Later checks treat it as valid.
+        # Later checks use the nearest valid type.
         kind = nearest(kind, JOINT_TYPES) or kind
     ends = {}
     for tag in ("parent", "child"):
@@ -267,7 +268,7 @@ def _edge(element: Element, values: AttributeReader) -> Edge | None:
 
 
 def _xyz_at(element: Element) -> Span | None:
-    """Return the place of a joint's position, if it has one."""
+    """Return the span of a joint's position, None without a position."""
     origin = element.first("origin")
     if origin is None or "xyz" not in origin.attributes:
         return None
@@ -328,9 +329,9 @@ def _safety(
 def _numbers(
     cls: type[T], element: Element | None, values: AttributeReader, **defaults: float
 ) -> T | None:
-    """Return the object whose fields are the element's attributes.
+    """Return an object whose fields are the element's attributes.
 
-    Those that are missing have their defaults.
+    Missing attributes have their defaults.
     """
     if element is None:
         return None
@@ -343,7 +344,7 @@ def _numbers(
 
 @dataclass
 class _Bodies:
-    """Read the links of a document."""
+    """Reads the links of a document."""
 
     values: AttributeReader
     find: Callable[[str, Span], tuple[Asset, Finding | None]]
@@ -361,7 +362,7 @@ class _Bodies:
                 self._elements.setdefault(material.attributes.get("name", ""), []).append(material)
 
     def link(self, name: str, element: Element) -> Link:
-        """Return the body."""
+        """Return the link of the element."""
         visuals = tuple(shape for child in element.all("visual") for shape in self._shapes(child))
         collisions = tuple(
             shape for child in element.all("collision") for shape in self._shapes(child)
@@ -433,21 +434,27 @@ class _Bodies:
     def _material(self, element: Element) -> Material | None:
         """Return the colour or texture of a visual.
 
-        One that is only named is described elsewhere in the document.
+        If the visual only names a material, another element of the document describes the
+        material.
         """
         material = element.first("material")
         if material is None:
             return None
         name = material.attributes.get("name", "")
-        found = self._describe_material(name, material) or (
+        material_of_visual = self._describe_material(name, material) or (
             self._find_material(name) if name else None
         )
-        if found is None and name and element.tag == "visual" and name not in self._undescribed:
+        if (
+            material_of_visual is None
+            and name
+            and element.tag == "visual"
+            and name not in self._undescribed
+        ):
             self._undescribed.add(name)
             advice = did_you_mean(name, self._described_names, 'describe it: <color rgba="…"/>')
             message = f"no material {name} with a color or texture"
             self.values.refuse(message, material.value_span("name"), advice, "warning")
-        return found
+        return material_of_visual
 
     @cached_property
     def _described_names(self) -> list[str]:

@@ -1,8 +1,8 @@
-"""Expansion of xacro files by xacro itself; its errors become findings at their places.
+"""Expansion of xacro files with xacro itself; errors of xacro become findings at their places.
 
-xacro runs confined in a separate process, which requests each file from this one. It reports the
-expression and the macros where it stopped, but neither line nor column, so this module searches
-for them.
+xacro runs in a sandbox in a separate process, which requests each file from this process. It
+reports the expression and the macros where it stopped, but neither line nor column. This module
+searches the files for them.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ if TYPE_CHECKING:
     from tfcompose.compiler.urdf.packages import Packages
     from tfcompose.compiler.urdf.xacro import Use
 
-#: The module that runs xacro, confined.
+#: The module that runs xacro in the sandbox.
 PROCESS = "tfcompose.compiler.urdf.xacro_process"
-#: Patterns with which a file declares an argument, and uses one.
+#: Declaration or use of an argument in a file.
 _ARGUMENT = re.compile(
     r"""<xacro:arg\b[^>]{0,4000}?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)"""
 )
-#: Names in xacro's messages, and the text around them in a file.
+#: Patterns of names in xacro's messages, and of the text around such a name in a file.
 _NAMED = (
     (re.compile(r"when evaluating expression '(.+)'"), r"\$\{\s*", r"\s*\}"),
     (re.compile(r"unknown macro name: (xacro:\S+)"), "<", r"(?=[\s/>])"),
 )
-#: Maximum number of words of an expression that are searched for: each possible start in a file is
-#: tried with all of them.
+#: Maximum number of words of an expression to search for. The search tries all words at each
+#: possible start in a file.
 _MOST_WORDS = 20
 _WORD = re.compile(r"""["']?(\w+)["']?""")
-#: The largest number of macros around an error that are named.
+#: Maximum number of enclosing macros that a finding names.
 _MOST_MACROS = 5
-#: Files that are read, and bytes of each.
+#: Maximum number of files to read, and of bytes in each file.
 _MOST_FILES, _MOST_BYTES = 10_000, 16_000_000
-#: The name of a package: no path.
+#: A package name, which is not a path.
 _PACKAGE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-#: Bytes of an expression that the process keeps for when it ends.
+#: Maximum bytes of the current expression that the process stores, for the case that it dies.
 _NOTED = 4000
 _OUTSIDE = (
     "a file may read only its own folder, its repository and ROS packages (folders with a"
@@ -64,7 +64,7 @@ _ALONE = (
 
 
 _PLACE = ([int], None)
-#: Shape of the process's answer.
+#: Structure of the process's answer.
 _MADE = {"text": str, "files": [str], "places": [_PLACE], "comments": [[int]]}
 _MARK = ([(str, int)], None)
 _STOPPED = {
@@ -76,18 +76,18 @@ _STOPPED = {
     "at": _MARK,
 }
 _PAIR, _IN_PLACE = 2, 3
-#: Characters of a reason, and files and macros around it.
+#: Maximum number of characters of a reason, and of files and macros around it.
 _LONGEST, _DEEPEST = 4000, 100
 
 
 @dataclass(frozen=True, slots=True)
 class Sandbox:
-    """Limits of a xacro run, and callbacks for its output and missing confinement."""
+    """Limits of a xacro run, and callbacks for its output and for missing sandbox features."""
 
     reach: Reach = field(default_factory=Reach)
     print_output: Callable[[str, str], None] = lambda _file, _text: None
     report_missing: Callable[[tuple[str, ...]], None] = lambda _: None
-    #: Whether xacro is refused where the kernel cannot confine it.
+    #: Whether to reject the file if the kernel cannot run xacro in a sandbox.
     is_strict: bool = False
 
 
@@ -100,12 +100,13 @@ def expand(
 ) -> Expansion:
     """Return the expansion of a file, or of a call of one of its macros.
 
-    ``packages`` resolve $(find …). Readable are the trees of the file that names it, of the
-    package that contains it and of those that it finds, besides those of the sandbox.
+    ``packages`` resolves $(find …). xacro can read the folder tree of the file that names the
+    xacro file, of the package around the xacro file, of packages that it finds, and of the
+    sandbox.
 
     Raises:
-        RejectedError: if xacro refuses the file, or needs too much for it; with the findings where
-            a robot file names it, if one does.
+        RejectedError: if xacro rejects the file or needs too many resources. Findings are placed
+            where a robot file names the xacro file, if there is one.
     """
     sandbox = sandbox or Sandbox()
     values = {name: str(value) for name, value in arguments.items()}
@@ -140,7 +141,7 @@ def expand(
             raise RejectedError([_where_used(_end_finding(outcome, _text_in(noted), files), use)])
     if "text" not in answer:
         raise RejectedError([_refusal_of(_Stop.of(answer, files), files, packages, use)])
-    if files.refused:  # the file kept quiet about it
+    if files.refused:  # the xacro file caught the error
         outside = finding(
             "TF021", f"{files.refused[0]} may not be read", Span(file), help=_OUTSIDE
         )
@@ -154,7 +155,7 @@ def expand(
 
 
 def _is_made(answer: Any) -> bool:
-    """Return whether an answer is what xacro made of a file, whoever sent it."""
+    """Return whether an answer from the untrusted process is a valid expansion."""
     if not fits(answer, _MADE):
         return False
     count = len(answer["files"])
@@ -163,17 +164,21 @@ def _is_made(answer: Any) -> bool:
         return False
     try:
         answer["text"].encode()
-    except UnicodeEncodeError:  # half a character
+    except UnicodeEncodeError:  # an unpaired surrogate
         return False
     return min((number for place in places for number in place), default=0) >= 0
 
 
 class _XacroFiles:
-    """Answers what the process asks: only files that it may read, and remembers which."""
+    """Answers the process's requests for files, and remembers the files that it has read.
+
+    The process can read only permitted files.
+    """
 
     def __init__(self, file: str, packages: Packages, reach: Reach, use: Use | None) -> None:
         self.file, self._packages, self._reach = file, packages, reach
-        #: Absolute paths of files that were read, and the first path that was not.
+        #: Absolute paths of files that the process has read. ``refused`` holds the first rejected
+        #: path.
         self.served: dict[str, None] = {}
         self.refused: list[str] = []
         is_of_user = use is None or use.span.file.startswith("--")  # named on the command line
@@ -188,7 +193,7 @@ class _XacroFiles:
         }
 
     def has_served(self, name: str) -> bool:
-        """Return whether the process has read a file: it may not have any other one shown."""
+        """Return whether the process has read a file. Findings may show only such files."""
         return posixpath.abspath(name) in self.served
 
     def _find(self, name: str) -> tuple[Any, bytes]:
@@ -201,7 +206,7 @@ class _XacroFiles:
         )
         if not is_named or is_package(folder):
             self._reach.add_folder(folder)
-        return {"folder": posixpath.abspath(folder)}, b""  # it takes files from other folders
+        return {"folder": posixpath.abspath(folder)}, b""  # xacro must use this folder only
 
     def _read(self, path: str) -> tuple[Any, bytes]:
         if len(self.served) > _MOST_FILES:
@@ -241,29 +246,34 @@ def _document(use: Use) -> str:
 def _refuse_unknown(
     names: Mapping[str, str], files: Collection[str], file: str, use: Use | None
 ) -> None:
-    """Refuse arguments that none of the files declares or asks for; xacro itself ignores them."""
+    """Reject arguments that no file declares or uses, because xacro silently ignores them."""
     texts = [Path(name).read_text("utf-8", "replace") for name in files]
-    known = dict.fromkeys(
+    arguments = dict.fromkeys(
         name
         for text in texts
         for match in _ARGUMENT.finditer(text)
         for name in match.groups()
         if name
     )
-    wrong = [name for name in names if name not in known]
+    wrong = [name for name in names if name not in arguments]
     if wrong:
-        raise RejectedError([_where_used(_no_argument(name, known, file), use) for name in wrong])
+        raise RejectedError(
+            [_where_used(_no_argument(name, arguments, file), use) for name in wrong]
+        )
 
 
-def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
-    there = f"known: {', '.join(known)}" if known else "the file takes no arguments"
+def _no_argument(name: str, arguments: Collection[str], file: str) -> Finding:
+    otherwise = f"known: {', '.join(arguments)}" if arguments else "the file takes no arguments"
     return finding(
-        "TF106", f"unknown argument {name}", Span(file), help=did_you_mean(name, known, there)
+        "TF106",
+        f"unknown argument {name}",
+        Span(file),
+        help=did_you_mean(name, arguments, otherwise),
     )
 
 
 def _where_used(finding: Finding, use: Use | None) -> Finding:
-    """Return a finding in a xacro file at the place in the robot file that names it."""
+    """Move a finding in a xacro file to the place in the robot file that names the xacro file."""
     if use is None or finding.span is None:
         return finding
     exact = (
@@ -278,7 +288,7 @@ def _where_used(finding: Finding, use: Use | None) -> Finding:
 
 
 def _in_call(finding: Finding, file: str, use: Use) -> Finding:
-    """Return what xacro says about a macro call, at its parameter, with what it takes."""
+    """Place xacro's finding about a macro call at the parameter, with the macro's parameters."""
     named = [name for name in _WORD.findall(finding.message) if name in use.places]
     macros, span = macros_in(Path(file).read_text("utf-8", "replace")), use.span
     if use.macro in macros:
@@ -299,18 +309,18 @@ class _Stop:
 
     kind: str
     reason: str
-    #: The files that were being read, innermost last.
+    #: Files that xacro was reading, innermost last.
     files: list[str]
-    #: The macros that were being expanded, innermost last, each with its file.
+    #: Macros that xacro was expanding, innermost last, each with its file.
     macros: list[tuple[str, str]]
-    #: The place of broken XML: file, line, column from 0.
+    #: The place of invalid XML: file, line, column from 0.
     error: tuple[str, int, int] | None
     #: The element that xacro was evaluating: file, line, column from 0.
-    at: tuple[str, int, int] | None
+    element: tuple[str, int, int] | None
 
     @classmethod
     def of(cls, answer: Mapping[str, Any], files: _XacroFiles) -> _Stop:
-        """Return what the process says, as far as it is about files that it has read."""
+        """Return the process's report, without files that the process has not read."""
 
         def mark(value: Any) -> tuple[str, int, int] | None:
             if not fits(value, [(str, int)]) or list(map(type, value)) != [str, int, int]:
@@ -330,41 +340,47 @@ class _Stop:
 
 
 def _refusal_of(stop: _Stop, files: _XacroFiles, packages: Packages, use: Use | None) -> Finding:
-    """Return what xacro did not like, or something that it called, and where."""
+    """Return the finding with the reason why xacro stopped, and its place."""
     file = files.file
-    begins = [(stop.at[0], stop.at[1])] if stop.at else []
+    begins = [(stop.element[0], stop.element[1])] if stop.element else []
     if stop.kind == "package":
         missing = replace(packages.not_found(stop.reason, None), severity="error", span=Span(file))
-        found = _at_words(missing, rf"\$\(find\s+{re.escape(stop.reason)}\s*\)", begins)
+        shown_path = _at_words(missing, rf"\$\(find\s+{re.escape(stop.reason)}\s*\)", begins)
     elif stop.kind == "argument":
         message = f"the argument {stop.reason} has no value and no default"
         advice = f"give it: {stop.reason}:=…, or in a part args: {{{stop.reason}: …}}"
         missing = finding("TF106", message, Span(file), help=advice)
-        found = _at_words(missing, rf"\$\(arg\s+{re.escape(stop.reason)}\s*\)", begins)
+        shown_path = _at_words(missing, rf"\$\(arg\s+{re.escape(stop.reason)}\s*\)", begins)
     elif stop.kind == "limit":
-        found = _place_finding(
+        shown_path = _place_finding(
             finding("TF008", stop.reason, Span(file), help=_ALONE.format(file=file)), stop, begins
         )
     elif stop.kind == "outside":
-        found = _place_finding(
+        shown_path = _place_finding(
             finding("TF021", stop.reason, Span(file), help=_OUTSIDE), stop, begins
         )
     elif stop.kind == "unsafe":
-        found = _place_finding(
+        shown_path = _place_finding(
             finding("TF022", stop.reason, Span(file), help=_UNSAFE), stop, begins
         )
     else:
-        found = _place_finding(finding("TF018", f"xacro: {stop.reason}", Span(file)), stop, begins)
-    found = _relative_to(file, found)
-    others = [name for name in stop.files[-1:] if Path(name).absolute() != Path(file).absolute()]
-    if others and found.span == Span(file) and stop.kind not in {"package", "argument"}:
-        found = replace(found, message=f"{found.message} (in {os.path.relpath(others[0])})")
+        shown_path = _place_finding(
+            finding("TF018", f"xacro: {stop.reason}", Span(file)), stop, begins
+        )
+    shown_path = _relative_to(file, shown_path)
+    inner_files = [
+        name for name in stop.files[-1:] if Path(name).absolute() != Path(file).absolute()
+    ]
+    if inner_files and shown_path.span == Span(file) and stop.kind not in {"package", "argument"}:
+        shown_path = replace(
+            shown_path, message=f"{shown_path.message} (in {os.path.relpath(inner_files[0])})"
+        )
     is_of_call = use and use.macro and stop.kind == "refused" and files.has_served(file)
-    return _in_call(found, file, use) if use and is_of_call else _where_used(found, use)
+    return _in_call(shown_path, file, use) if use and is_of_call else _where_used(shown_path, use)
 
 
 def _at_words(finding: Finding, pattern: str, begins: list[tuple[str, int]]) -> Finding:
-    """Return the finding at the first words of the pattern from one of these lines on."""
+    """Return the finding at the first match of the pattern, from one of these lines on."""
     span = next(
         (span for file, line in begins if (span := _first(file, pattern, line))), finding.span
     )
@@ -372,10 +388,10 @@ def _at_words(finding: Finding, pattern: str, begins: list[tuple[str, int]]) -> 
 
 
 def _place_finding(finding: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Finding:
-    """Return the finding at its words, with notes about the macros being expanded.
+    """Return the finding at the text that it names, with notes about enclosing macros.
 
-    Where the words are not to be found it is at the element that xacro was busy with. Places are
-    in the files as xacro names them.
+    If no file contains the text, the finding is at the element that xacro was processing. Files
+    have the names that xacro uses.
     """
     around = dict.fromkeys((name, file) for name, file in reversed(stop.macros))
     inner = [(name, begin) for name, file in around if (begin := _definition(file, name))]
@@ -388,7 +404,7 @@ def _place_finding(finding: Finding, stop: _Stop, begins: list[tuple[str, int]])
             *((macro.file, macro.line) for _, macro in inner),
             *((file, 0) for file in stop.files[::-1]),
         ]
-        busy = _mark(*stop.at) if stop.at else finding.span
+        busy = _mark(*stop.element) if stop.element else finding.span
         span = next(
             (name for file, line in begins for name in _find_spans(finding.message, file, line)),
             busy,
@@ -401,7 +417,7 @@ def _mark(file: str, line: int, column: int) -> Span:
 
 
 def _end_finding(outcome: Outcome, noted: str, files: _XacroFiles) -> Finding:
-    """Return the finding that the process was ended, and what it was evaluating then."""
+    """Return the finding that the process was killed, with the expression it was evaluating."""
     code, file = outcome.code, files.file
     if outcome.timed_out:
         message = f"xacro was ended: it took more than {confined.MOST_WALL_S:g} s"
@@ -417,9 +433,9 @@ def _end_finding(outcome: Outcome, noted: str, files: _XacroFiles) -> Finding:
         by_signal = f"xacro was ended by {_signal_name(-code)}"
         message = by_signal if code < 0 else f"xacro gave up with code {code}"
     full = f"{message}: {noted}" if noted else message
-    found = finding("TF008", full, Span(file), help=_ALONE.format(file=file))
+    error = finding("TF008", full, Span(file), help=_ALONE.format(file=file))
     pattern = _pattern_of(noted)
-    return _at_words(found, pattern, [(file, 0)]) if pattern and files.has_served(file) else found
+    return _at_words(error, pattern, [(file, 0)]) if pattern and files.has_served(file) else error
 
 
 def _signal_name(number: int) -> str:
@@ -428,13 +444,13 @@ def _signal_name(number: int) -> str:
 
 
 def _text_in(noted: IO[bytes]) -> str:
-    """Return what the process was evaluating."""
+    """Return the expression that the process was evaluating."""
     noted.seek(0)
     return noted.read().partition(b"\0")[0].decode("utf-8", "replace")
 
 
 def _definition(file: str | None, macro: str) -> Span | None:
-    """Return where a file defines a macro, or None."""
+    """Return the span of a macro's definition in a file, or None."""
     return _first(
         file,
         rf"""<xacro:macro\s[^>]{{0,4000}}?\bname\s*=\s*["'](?:xacro:)?{re.escape(macro)}["']""",
@@ -443,7 +459,7 @@ def _definition(file: str | None, macro: str) -> Span | None:
 
 
 def _find_spans(message: str, file: str, line: int) -> Iterator[Span]:
-    """Yield where the file has what the message names, from a line on."""
+    """Yield the spans of names from the message in the file, from a line on."""
     for naming, before, after in _NAMED:
         for match in naming.finditer(message):
             end = after if len(match[1].split()) <= _MOST_WORDS else ""
@@ -453,12 +469,12 @@ def _find_spans(message: str, file: str, line: int) -> Iterator[Span]:
 
 
 def _pattern_of(text: str) -> str:
-    """Return the pattern of the first words of a text, however it is broken into lines."""
+    """Return a pattern for the first words of a text, with any line breaks between them."""
     return r"\s+".join(map(re.escape, text.split()[:_MOST_WORDS]))
 
 
 def _first(file: str | None, pattern: str, line: int) -> Span | None:
-    """Return the first place of the pattern in the file from a line on, or None."""
+    """Return the span of the pattern's first match in the file from a line on, or None."""
     if not file:
         return None
     text = Path(file).read_text("utf-8", "replace")
@@ -474,7 +490,10 @@ def _position(text: str, index: int) -> tuple[int, int]:
 
 
 def _relative_to(file: str, finding: Finding) -> Finding:
-    """Return the finding with places relative to the working folder, ``file`` as named."""
+    """Return the finding with paths relative to the working directory.
+
+    The path ``file`` stays as the user wrote it.
+    """
 
     def find_span(span: Span | None) -> Span | None:
         return span._replace(file=_show_file(span.file, file)) if span else None
@@ -484,5 +503,5 @@ def _relative_to(file: str, finding: Finding) -> Finding:
 
 
 def _show_file(name: str, file: str) -> str:
-    """Return a file's name as seen from the working folder; ``file`` is as it is named."""
+    """Return a path relative to the working directory; ``file`` stays as the user wrote it."""
     return file if Path(name).absolute() == Path(file).absolute() else os.path.relpath(name)

@@ -1,9 +1,9 @@
-"""Volumes, centres and moments of inertia of solids, their sums, and other densities.
+"""Volumes, centres and moments of inertia of solids and of their sums.
 
-Moments about the centre of mass, V the volume: box V/12 (b² + c²); cylinder along z V/12 (3r² +
-l²) and V r²/2; sphere 2/5 V r². A capsule is a cylinder C and two half spheres S whose centres of
-mass are 3/8 r outside its ends: along z C r²/2 + 2/5 S r², across C (r²/4 + l²/12) + S (2/5 r² +
-l²/4 + 3/8 l r). Sums follow the parallel axis theorem.
+Moments are about the centre of mass. V is the volume. Box: V/12 (b² + c²). Cylinder along z: V/12
+(3r² + l²) and V r²/2. Sphere: 2/5 V r². A capsule is a cylinder C and two half spheres S whose
+centres of mass are 3/8 r outside its ends. Its moments are C r²/2 + 2/5 S r² along z, and C (r²/4
++ l²/12) + S (2/5 r² + l²/4 + 3/8 l r) across. Sums follow the parallel axis theorem.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 Tensor = tuple[float, float, float, float, float, float]
 
 _UNMOVED = Pose()
-#: Rounding error of a product of inertia that is 0, relative to the trace.
+#: Relative to the trace, a smaller product of inertia is the rounding error of 0.
 _NOISE = 1e-15
 
 
 class UnmeasurableError(Exception):
-    """A mesh has no volume, or it cannot be read: code, message and help of the finding."""
+    """A mesh has no volume or cannot be read; has code, message and help for a finding."""
 
     def __init__(self, code: str, message: str, advice: str) -> None:
         self.code, self.advice = code, advice
@@ -38,24 +38,24 @@ class UnmeasurableError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Moments:
-    """Volume in m³, centre in m, and the tensor about it (xx, xy, xz, yy, yz, zz) in m⁵.
+    """Volume in m³, centre in m, and the tensor (xx, xy, xz, yy, yz, zz) about the centre in m⁵.
 
-    The tensor is also in kg m² at 1 kg/m³.
+    At a density of 1 kg/m³, the tensor has the same values in kg m².
     """
 
     volume: float
     centre: Vector
     tensor: Tensor
 
-    def at(self, pose: Pose) -> Moments:
-        """Return the same solid moved by the pose, in the axes of the pose's parent: R I R^T."""
+    def moved(self, pose: Pose) -> Moments:
+        """Return the moments of the solid moved by the pose, in the pose's parent: R I R^T."""
         if pose == _UNMOVED:
             return self
         rows = matrix_from_quat(normalise(pose.quat_xyzw))
         xx, xy, xz, yy, yz, zz = self.tensor
-        own = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         x, y, z = (
-            tuple(math.fsum(row[k] * own[k][j] for k in range(3)) for j in range(3))
+            tuple(math.fsum(row[k] * matrix[k][j] for k in range(3)) for j in range(3))
             for row in rows
         )
         turned = [
@@ -102,22 +102,22 @@ def join_moments(parts: Sequence[Moments]) -> Moments:
 
 
 def of_primitive(shape: Shape) -> Moments:
-    """Return the moments of a primitive in the axes that its pose is given in.
+    """Return the moments of a primitive shape, in the frame of the shape's pose.
 
     Raises:
-        ValueError: for a mesh, whose file would have to be read.
+        ValueError: for a mesh, because that requires the mesh's file.
     """
     if shape.kind == "mesh":
         raise ValueError("a mesh is not a primitive")
     volume, (x, y, z) = _SOLIDS[shape.kind](*shape.size)
-    return Moments(volume, (0.0, 0.0, 0.0), (x, 0.0, 0.0, y, 0.0, z)).at(shape.pose)
+    return Moments(volume, (0.0, 0.0, 0.0), (x, 0.0, 0.0, y, 0.0, z)).moved(shape.pose)
 
 
 def inertial(moments: Moments, density: float, mass: float | None = None) -> Inertial:
-    """Return the inertia of a solid of this density (kg/m³), in the axes of its moments.
+    """Return the inertia of a solid with this density in kg/m³, in the axes of its moments.
 
-    ``mass`` (kg) is the exact mass if the density was derived from it. Recomputing it would add a
-    rounding error.
+    ``mass`` is the exact mass in kg, if the density was derived from the mass. Computing the mass
+    from the density would add a rounding error.
     """
     noise = density * _NOISE * trace(moments.tensor)
     xx, xy, xz, yy, yz, zz = (density * value for value in moments.tensor)
@@ -131,18 +131,21 @@ def inertial(moments: Moments, density: float, mass: float | None = None) -> Ine
 
 
 def of_primitives(mass: float, shapes: Sequence[Shape]) -> Inertial:
-    """Return the inertia of a body of this mass (kg) and uniform density, in its shapes' axes."""
+    """Return the inertia of a body of ``mass`` kg and uniform density, in its shapes' axes."""
     moments = join_moments([of_primitive(shape) for shape in shapes])
     return inertial(moments, mass / moments.volume, mass)
 
 
 def trace(tensor: Tensor) -> float:
-    """Return the sum of the principal moments, which is the same in all axes."""
+    """Return the sum of the principal moments, which does not depend on the axes."""
     return tensor[0] + tensor[3] + tensor[5]
 
 
 def traces(mass: float, *bodies: tuple[Shape, ...]) -> tuple[float, ...]:
-    """Return the tensor's trace at this mass and uniform density for each primitive body."""
+    """Return the trace of the tensor for each body of primitives, at this mass in kg.
+
+    The density of a body is uniform.
+    """
     primitives = [
         shapes for shapes in bodies if shapes and not any(shape.mesh for shape in shapes)
     ]

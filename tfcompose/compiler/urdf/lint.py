@@ -1,4 +1,4 @@
-"""Lint of a URDF or xacro file that tfcompose did not write, with places in that file."""
+"""Lint of a URDF or xacro file that tfcompose did not write, with spans in that file."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 def lint_urdf(
     file: str, packages: Packages, arguments: Mapping[str, str] | None = None
 ) -> list[Finding]:
-    """Return the findings about the file, by place.
+    """Return the findings about the file, sorted by place.
 
-    A xacro file is expanded. Places are in the files where elements are written.
+    A xacro file is expanded. Findings have the places where the elements are written.
     """
     try:
         document = read_urdf(file, packages, arguments)
@@ -54,25 +54,24 @@ class Document:
         return self.converted.robot
 
     def findings(self) -> list[Finding]:
-        """Return the findings about it, by place, without those that its comments allow."""
+        """Return the findings by place, without findings that comments in the file allow."""
         roots = self.robot.roots()
         robot = replace(with_hardware(self.robot), base=roots[0] if len(roots) == 1 else None)
-        found = dict.fromkeys([*self.converted.findings, *check(robot, _RULES)])
-        kept, used = apply(found, self.allows)
+        unique = dict.fromkeys([*self.converted.findings, *check(robot, _RULES)])
+        kept, used = apply(unique, self.allows)
         return sorted([*kept, *unused_allows(self.allows, used)], key=lambda entry: entry.sort_key)
 
 
 def read_urdf(
     file: str, packages: Packages, arguments: Mapping[str, str] | None = None
 ) -> Document:
-    """Return the file's document.
+    """Return the document of a URDF or xacro file.
 
-    A xacro file, recognised by name or content, is expanded with the arguments.
+    A file counts as xacro by its name or content, and is expanded with the arguments.
 
     Raises:
-        RejectedError: if it cannot be read, or is no URDF; or takes no arguments, and is given
-            some.
-        ValueError: if the packages have no disk to read from.
+        RejectedError: if the file cannot be read or is not a URDF, or if a URDF gets arguments.
+        ValueError: if ``packages`` has no disk.
     """
     disk = packages.disk
     if disk is None:
@@ -104,10 +103,7 @@ def read_urdf(
 
 
 def _kept_allows(expansion: Expansion, read: Callable[[str], str]) -> Iterator[Allow]:
-    """Yield the comments that allow findings, of those that xacro keeps.
-
-    It leaves out what it does not expand.
-    """
+    """Yield the comments that allow findings, without comments in code that xacro left out."""
     for number in dict.fromkeys(file for file, _, _ in expansion.comments):
         begins = {
             (line, column + 1) for file, line, column in expansion.comments if file == number

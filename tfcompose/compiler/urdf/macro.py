@@ -1,8 +1,8 @@
-"""The robot as a macro for other people's xacro, and a file that calls it.
+"""The robot as a macro for other xacro files, and a xacro file that calls the macro.
 
-The macro has a prefix, a parent and an origin. Its body is the robot's URDF with ``${prefix}`` in
-front of the name of every link, joint, material and piece of hardware. Text that xacro would
-evaluate is escaped. If two materials share a name, readers take the first colour.
+The macro has a prefix, a parent and an origin. Its body is the robot's URDF with ``${prefix}``
+before the name of each link, joint, material and hardware component. Text that xacro would
+evaluate is escaped. If two materials share a name, URDF readers use the first colour.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MACRO = "robot.macro.xacro"
 _EVALUATED = re.compile(r"(\$+[{(])")
 #: Addresses that are not relative to the written file.
 _ABSOLUTE = re.compile(r"/|[A-Za-z][A-Za-z0-9+.-]*://")
-#: Tags of xacro's own, which no macro can be called.
+#: Tags that xacro reserves. A macro cannot have these names.
 _TAGS = frozenset(
     {
         "arg",
@@ -44,13 +44,13 @@ _TAGS = frozenset(
 def macro_name(robot: str) -> str:
     """Return the name of the robot's macro.
 
-    It is the robot's name unless that is reserved in xacro or Python.
+    This is the robot's name, with the suffix _robot if xacro or Python reserves the name.
     """
     return f"{robot}_robot" if robot in _TAGS or keyword.iskeyword(robot) else robot
 
 
 def macro(robot: Robot, target: Target = AS_IN_SOURCE) -> str:
-    """Return the file with the robot's macro; ``target`` says how files are addressed."""
+    """Return the file with the robot's macro; ``target`` holds the form of file addresses."""
     name, base = macro_name(robot.name), robot.base or ""
     writer = _MacroWriter(robot, target)
     body = "\n".join([*writer.body(robot)[0], *writer.hardware(robot), *_blocks(robot)])
@@ -80,7 +80,7 @@ def macro(robot: Robot, target: Target = AS_IN_SOURCE) -> str:
 
 
 class _MacroWriter(UrdfWriter):
-    """Writes what the macro makes links, joints and hardware of."""
+    """Writes the links, joints and hardware of the macro."""
 
     def __init__(self, robot: Robot, target: Target) -> None:
         super().__init__(target)
@@ -97,7 +97,7 @@ class _MacroWriter(UrdfWriter):
         return super().content(_literal(text))
 
     def parameter(self, text: str) -> str:
-        """Return the content with the prefix if it is the name of a link or joint, and no more."""
+        """Return the content, with the prefix if it is exactly the name of a link or joint."""
         return ("${prefix}" if text in self.names else "") + self.content(text)
 
     def address(self, asset: Asset) -> str:
@@ -109,16 +109,16 @@ class _MacroWriter(UrdfWriter):
 
 
 def _literal(text: str) -> str:
-    """Return the text as one that xacro leaves as it is."""
+    """Return the text with escapes, so that xacro does not evaluate it."""
     return _EVALUATED.sub(r"$\1", text) if "$" in text else text
 
 
 def _blocks(robot: Robot) -> list[str]:
-    """Return the raw blocks with the prefix added to the robot's names and nothing else."""
+    """Return the raw blocks with the prefix before the robot's names."""
     if not robot.blocks:
         return []
     names = [*_names(robot), *(name for block in robot.blocks for name in block.own_names())]
-    again = {name: f"${{prefix}}{name}" for name in map(_literal, names)}  # as in the text below
+    again = {name: f"${{prefix}}{name}" for name in map(_literal, names)}  # escaped like the text
     return block_lines(
         replace(block, text=_literal(block.text)).rename(again) for block in robot.blocks
     )
@@ -129,9 +129,9 @@ def _names(robot: Robot) -> list[str]:
 
 
 def caller(robot: Robot) -> str:
-    """Return the file that describes the robot alone.
+    """Return the xacro file that describes only this robot.
 
-    It calls the macro with arguments of the same names.
+    It calls the macro, and passes on arguments with the names of the macro's parameters.
     """
     defaults = {"prefix": "", "parent": "", "xyz": "0 0 0", "rpy": "0 0 0"}
     arguments = "\n".join(

@@ -1,4 +1,4 @@
-"""Volume, centre and moments of inertia enclosed by a mesh, integrated by trimesh."""
+"""Volume, centre and moments of inertia of the solid inside a mesh, computed by trimesh."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from tfcompose.compiler.urdf.inertia import Moments, UnmeasurableError
 if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
 
-#: The part of its size cubed below which a volume is what rounding leaves of a plane.
+#: A volume below this fraction of the size cubed is the rounding error of a flat mesh.
 _FLAT = 1e-12
 
 
 def moments(path: str, scale: Vector) -> Moments:
-    """Return volume, centre and tensor of a closed mesh at a scale, in the unit of ``read_mesh``.
+    """Return volume, centre and tensor of a closed mesh at a scale, in metres.
 
     Raises:
-        UnmeasurableError: if the file is no mesh, or the mesh is not closed or has faces turned
-            both ways.
+        UnmeasurableError: if the file is not a mesh, or the mesh is not closed, or its faces have
+            inconsistent orientations.
     """
     try:
         mesh = read_mesh(path, scale)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # numpy's, about what is divided by a volume of 0
+            warnings.simplefilter("ignore")  # numpy warns about divisions by a volume of 0
             why = _why_open(mesh)
             mesh = mesh if why else _facing_alike(mesh)
             why = why or _why_flat(mesh)
@@ -41,14 +41,14 @@ def moments(path: str, scale: Vector) -> Moments:
     if not 0 < abs(volume) < math.inf:
         advice = "fix it, give a closed collision shape, or give mass and inertia"
         raise UnmeasurableError("TF725", why or "it has no volume", advice)
-    mesh.density = math.copysign(1.0, volume)  # where all its triangles face inwards
+    mesh.density = math.copysign(1.0, volume)  # negative if all triangles face inwards
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = mesh.moment_inertia.tolist()
     x, y, z = mesh.center_mass.tolist()
     return Moments(abs(volume), (x, y, z), (xx, xy, xz, yy, yz, zz))
 
 
 def _why_open(mesh: Any) -> str:
-    """Return why the triangles enclose nothing, or an empty text."""
+    """Return why the triangles do not enclose a volume; empty if they do."""
     if not len(mesh.faces):
         return "it has no triangles"
     if not mesh.is_watertight:
@@ -63,20 +63,20 @@ def _why_flat(mesh: Any) -> str:
 
 
 def _facing_alike(mesh: Any) -> Any:
-    """Return the mesh with consistent orientation: bodies outwards, cavities inwards.
+    """Return the mesh with consistent orientation: bodies face outwards, cavities inwards.
 
-    A separate body that faces inwards is no hole: integrated as it is, it would have a negative
-    mass. A cavity faces the other way too, but lies within a body. The mesh has to be closed and
-    wound consistently.
+    A body that faces inwards would get a negative mass, so it is turned. A cavity also faces
+    inwards, but is inside another body, so it is kept. The mesh must be closed, with consistent
+    winding.
     """
     corners = mesh.vertices[mesh.faces] - mesh.bounds.mean(axis=0)
     signed = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     body = _bodies(mesh.faces, len(mesh.vertices))
     volumes = np.bincount(body, signed)
     outward = np.sign(volumes[np.abs(volumes).argmax()])
-    others = np.flatnonzero(volumes * outward < 0)
+    inward = np.flatnonzero(volumes * outward < 0)
     solid = corners[volumes[body] * outward > 0]
-    apart = [other for other in others if not _is_within(corners[body == other][0, 0], solid)]
+    apart = [number for number in inward if not _is_within(corners[body == number][0, 0], solid)]
     if not apart:
         return mesh
     turned, faces = np.isin(body, apart), mesh.faces.copy()
@@ -85,9 +85,9 @@ def _facing_alike(mesh: Any) -> Any:
 
 
 def _bodies(faces: Any, count: int) -> Any:
-    """Return for each face the number of its body.
+    """Return the number of each face's body.
 
-    The least of all corners that edges connect with its own.
+    The number is the smallest vertex index among all vertices that edges connect with the face.
     """
     least = np.arange(count)
     ends = np.concatenate((faces[:, :2], faces[:, 1:]))
@@ -104,9 +104,8 @@ def _bodies(faces: Any, count: int) -> Any:
 def _is_within(point: Any, corners: Any) -> bool:
     """Return whether the triangles enclose the point.
 
-    The solid angles at which it sees them sum up to a sphere.
-
-    Van Oosterom and Strackee, The Solid Angle of a Plane Triangle, 1983.
+    They do if the solid angles of the triangles from the point add up to a full sphere. Source:
+    van Oosterom and Strackee, The Solid Angle of a Plane Triangle, 1983.
     """
     a, b, c = (corners[:, index] - point for index in range(3))
     la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))

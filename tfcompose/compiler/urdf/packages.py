@@ -1,7 +1,8 @@
 """Lookup of packages and files.
 
-The order is the robot's ``packages:``, the ament index, then the folders around the file. Nothing
-is opened here. Access to files is passed in, so that a robot can be compiled from text alone.
+The lookup searches the robot's ``packages:``, then the ament index, then the folders around the
+file. This module opens no files itself. It gets functions that access files, so that a robot can
+be compiled from text alone.
 """
 
 from __future__ import annotations
@@ -25,22 +26,21 @@ if TYPE_CHECKING:
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
-#: Forms that others use for a file in a package: xacro and launch files, and addresses with a
-#: missing slash.
+#: Other forms of addresses: xacro's and launch's, and an address with a missing slash.
 _MEANT = re.compile(
     r"(?:(?:file://)?\$\(find(?:-pkg-share)?\s+([\w.-]+)\s*\)|package:/?([\w.-]+))/+(.+)"
 )
-#: A file in a package: package://NAME/PATH, or as xacro and launch files write it.
+#: A file in a package: package://NAME/PATH, or the forms of xacro and launch files.
 _IN_PACKAGE = re.compile(
     r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)"
 )
-_NEAR = 0.8  # many packages end in _description
+_NEAR = 0.8  # high, because many names end in _description
 OUTSIDE = (
     "with --untrusted a robot reads its folder, its repository, packages and presets; leave"
     " --untrusted out for files of your own"
 )
 FETCH = "run git lfs pull to fetch the file"
-_HIGHEST = 12  # so many folders above a file its package.xml is looked for
+_HIGHEST = 12  # number of parent folders to search for a package.xml
 
 
 def _reject_expansion(file: str, *_: object) -> Expansion:
@@ -49,59 +49,59 @@ def _reject_expansion(file: str, *_: object) -> Expansion:
 
 @dataclass(frozen=True, slots=True)
 class Disk:
-    """Access to files and packages for a compiler."""
+    """Functions that access files and packages for the compiler."""
 
     read: Callable[[str], str]
     is_file: Callable[[str], bool]
     is_folder: Callable[[str], bool]
     #: The entries of AMENT_PREFIX_PATH, in order.
     prefixes: tuple[str, ...] = ()
-    #: Return the moments of a mesh file at a scale. Raises ``UnmeasurableError`` with the parts of
-    #: the finding.
+    #: Returns the moments of a mesh file at a scale. Raises ``UnmeasurableError`` with code,
+    #: message and help of the finding.
     moments: Callable[[str, Vector], Moments] | None = None
-    #: Expand a xacro file with arguments, or a robot file's use of it.
+    #: Expands a xacro file with arguments, or as a robot file uses it.
     expand: Callable[[str, Packages, Mapping[str, Any], Use | None], Expansion] = _reject_expansion
-    #: Whether the file is a Git LFS pointer instead of the content.
+    #: Returns whether the file is a Git LFS pointer instead of the content.
     is_pointer: Callable[[str], bool] = lambda _: False
-    #: Whether a file may be read at all.
+    #: Returns whether a file may be read.
     allows: Callable[[str], bool] = lambda _: True
 
 
 @dataclass(slots=True)
 class Packages:
-    """Find packages and addressed files."""
+    """Finds packages and files by their addresses."""
 
     disk: Disk | None = None
-    #: The robot file's ``packages:``: name → folder and its place.
+    #: The section ``packages:`` of the robot file: name → folder and its span.
     named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
     #: Help for a package that is not found.
     advice: str = "add packages: {{{name}: FOLDER}}, or source the workspace's setup file"
-    #: Packages, with their folders, that were found only around the file that addresses them, as
-    #: in a source tree that is not built.
+    #: Packages and their folders that were found only around the file that names them, as in a
+    #: source tree that is not built.
     local: dict[str, str] = field(default_factory=dict)
     _above: dict[str, tuple[str, str]] = field(default_factory=dict)
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def candidates(self, name: str) -> list[str]:
         """Return the possible folders of a package, in search order."""
-        own = [find_path(*self.named[name])] if name in self.named else []
-        return own + [
+        named_folders = [find_path(*self.named[name])] if name in self.named else []
+        return named_folders + [
             posixpath.join(prefix, "share", name)
             for prefix in (self.disk.prefixes if self.disk else ())
         ]
 
     def folder(self, name: str, file: str) -> str | None:
-        """Return the package's folder, or None if it is not found.
+        """Return the package's folder, or None.
 
         The last candidate is the package that contains ``file``.
         """
         if self.disk is None:
             return None
-        found = next(
+        first = next(
             (folder for folder in self.candidates(name) if self.disk.is_folder(folder)), None
         )
-        around, folder = ("", "") if found is not None else self._around(posixpath.dirname(file))
-        return (folder or ".") if around == name else found
+        around, folder = ("", "") if first is not None else self._around(posixpath.dirname(file))
+        return (folder or ".") if around == name else first
 
     def not_found(self, name: str, span: Span | None) -> Finding:
         """Return the finding that a package was not found, with the searched folders."""
@@ -116,9 +116,9 @@ class Packages:
         return finding("TF724", f"package {name} not found", span, help=advice, severity="warning")
 
     def path_of(self, named: str, span: Span) -> str:
-        """Return the path of a file that is named at a place.
+        """Return the path of a file that the robot file names at a span.
 
-        It is in a package, or relative to the file of the place.
+        The name is an address in a package, or a path relative to the file of the span.
 
         Raises:
             RejectedError: if the package is not found.
@@ -132,11 +132,11 @@ class Packages:
         return posixpath.join(folder, match[2])
 
     def asset(self, uri: str, span: Span, document: str = "") -> tuple[Asset, Finding | None]:
-        """Return the file that is addressed at a place, and findings about the address.
+        """Return the file at an address, and a finding if the address is wrong.
 
-        ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files.
-        Relative paths begin in the folder of the file that names them, or of the ``document`` that
-        includes it. Other schemes (``http``, ``model``) are left to other programs.
+        ``package://NAME/PATH`` is a file in a package. ``file:///PATH`` and plain paths are files.
+        A relative path starts in the folder of the file that contains it, or of the ``document``
+        that includes that file. Other schemes, such as ``http`` and ``model``, are not resolved.
         """
         document = document or span.file
         url = _MEANT.fullmatch(uri)
@@ -218,17 +218,17 @@ class Packages:
         return None
 
     def _package_above(self, path: str) -> tuple[str, str]:
-        """Return the package whose source or share folder the file is in, and its path there.
+        """Return the package that contains the file, and the file's path in the package.
 
-        Empty without one.
+        Both are empty if the file is in no source or share folder of a package.
         """
         name, top = self._around(posixpath.dirname(path))
         return (name, posixpath.relpath(path, top or ".")) if name else ("", "")
 
     def _around(self, folder: str) -> tuple[str, str]:
-        """Return the name and folder of the package that the folder is, or is in.
+        """Return the name and folder of the package that is or contains the folder.
 
-        Empty without one.
+        Both are empty without a package.
         """
         if folder not in self._above:
             self._above[folder] = self._find_above(folder)

@@ -1,8 +1,8 @@
-"""XML elements that know the span of every tag and attribute, even after xacro expansion.
+"""XML elements with the span of every tag and attribute, even after xacro expansion.
 
-Written directly on expat, because no XML library gives the columns of attributes. Documents
-that declare entities or a document type are refused: a robot needs neither, and both can make a
-small file large or read other files.
+The reader uses expat directly, because no XML library reports the columns of attributes. It
+rejects documents with entities or a document type. A robot needs neither, and both can make a
+small file huge or include other files.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 DEEPEST = 100
 
-#: Four times what a robot file may have: URDF takes about three times as many characters for the
-#: same robot.
+#: Four times the limit of a robot file, because URDF takes about three times as many characters
+#: for the same robot.
 MOST_CHARACTERS = 16_000_000
 
 _TAG = re.compile(r"<[^\s/>]+")
@@ -38,25 +38,24 @@ _BLOCK = 4096
 
 
 class _Text:
-    """A file's text, with positions of its bytes, computed on demand because few are needed."""
+    """A file's text, with the character positions of its bytes, computed on demand."""
 
     def __init__(self, text: str, file: str) -> None:
         self.text, self.file = text, file
         self.data = text.encode()
         self.starts = [0, *(match.end() for match in _BREAK.finditer(text))]
         self.has_broken_values = _BROKEN.search(text) is not None
-        self.before: list[
-            int
-        ] = []  # the number of characters before each block; empty if the text is ASCII
+        self.before: list[int] = []  # number of characters before each block; empty for ASCII text
         if len(self.data) != len(text):
             lengths = (
-                _characters(self.data[at : at + _BLOCK]) for at in range(0, len(self.data), _BLOCK)
+                _characters(self.data[offset : offset + _BLOCK])
+                for offset in range(0, len(self.data), _BLOCK)
             )
             self.before = list(accumulate(lengths, initial=0))
         self._tag: tuple[int, dict[str, tuple[int, int]], int] = (-1, {}, 0)
 
     def position(self, byte: int) -> int:
-        """Return the index of the character that begins at a byte."""
+        """Return the index of the character that begins at a byte offset."""
         if not self.before or byte <= 0:  # -1 in an empty text
             return max(byte, 0)
         block = byte // _BLOCK
@@ -75,7 +74,7 @@ class _Text:
         )
 
     def tag_at(self, begin: int) -> tuple[dict[str, tuple[int, int]], int]:
-        """Return the range of each attribute value, without quotes, and where the last one ends.
+        """Return the range of each attribute value, without quotes, and the end of the last value.
 
         ``begin`` is the index of the tag's first character. The last result is cached.
         """
@@ -95,24 +94,24 @@ def _characters(data: bytes) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Origin:
-    """Where an element is written: the text, and the character at which its tag begins."""
+    """The place of an element: the text, and the index of the first character of its tag."""
 
     source: _Text
     begin: int
 
     @classmethod
     def at(cls, source: _Text, line: int, column: int) -> _Origin:
-        """Return the place in a line, from 1, and column, from 0, or the nearest that there is."""
+        """Return the nearest existing origin to a line, from 1, and a column, from 0."""
         starts = source.starts
         begin = starts[min(max(line, 1), len(starts)) - 1] + column
         return cls(source, min(begin, len(source.text)))
 
 
 class Element:
-    """A tag with its attributes and child elements; ``text`` is its own text, if requested.
+    """A tag with its attributes and children; ``text`` is the element's own text, if requested.
 
-    ``begin`` and ``end`` are the byte offsets of its first and last tag. Places are in the text
-    or, for an expanded document, in the file that the element comes from.
+    ``begin`` and ``end`` are the byte offsets of its first and last tag. Spans are in the text. In
+    an expanded document, they are in the file that contains the element.
     """
 
     __slots__ = ("_origin", "_source", "attributes", "begin", "children", "end", "tag", "text")
@@ -136,7 +135,7 @@ class Element:
 
     @property
     def span(self) -> Span:
-        """The place of its tag."""
+        """The span of the element's tag."""
         declared = self._declared_origin()
         return declared.source.span(declared.begin, len(self.tag) + 1)
 
@@ -148,7 +147,7 @@ class Element:
         end = text.find(">", self._source.tag_at(begin)[1])
         if (
             text[end - 1] != "/"
-        ):  # it has an end tag; of the others expat's versions give different places
+        ):  # it has an end tag; without one, versions of expat report different offsets
             end = text.find(">", self._source.position(self.end))
         return text[begin : end + 1]
 
@@ -164,7 +163,7 @@ class Element:
         return None
 
     def walk(self) -> Iterator[Element]:
-        """Yield this element and all elements in it, in document order."""
+        """Yield this element and all its descendants, in document order."""
         waiting = [self]
         while waiting:
             element = waiting.pop()
@@ -172,15 +171,15 @@ class Element:
             waiting += reversed(element.children)
 
     def value_span(self, name: str) -> Span:
-        """Return the place of an attribute's value, or the element's if it is missing."""
+        """Return the span of an attribute's value, or of the element without this attribute."""
         declared = self._declared_origin()
         place = declared.source.tag_at(declared.begin)[0].get(name)
         return declared.source.span(place[0], place[1] - place[0] or 1) if place else self.span
 
     def raw_value(self, name: str) -> str:
-        """Return an attribute's value as in the text.
+        """Return an attribute's value as it is in the text.
 
-        XML replaces tabs and line breaks in it with spaces.
+        XML parsers replace tabs and line breaks in a value with spaces.
         """
         begin, end = self._source.tag_at(self._source.position(self.begin))[0].get(name, (0, 0))
         return self._source.text[begin:end]
@@ -192,7 +191,7 @@ class Element:
 
 
 def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
-    """Return the document's root; ``with_text``: elements have their own text too.
+    """Return the root of the document; ``with_text``: keep the elements' own text.
 
     Raises:
         RejectedError: if the text is not XML, declares entities, or is too large or too deep.
@@ -205,12 +204,10 @@ def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
 
 
 def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) -> Element:
-    """Return the root of the document that xacro made of a file.
-
-    Elements have the places where they were written.
+    """Return the root of an expanded document, with elements at the places where they are written.
 
     Raises:
-        RejectedError: as ``read_xml``.
+        RejectedError: as in ``read_xml``.
     """
     refuse_unreadable(expansion.text, file, MOST_CHARACTERS)
     reader = _UrdfReader(expansion.text, file)
@@ -223,7 +220,7 @@ def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) 
     return reader.read()
 
 
-#: expat's errors where a tag is not closed.
+#: expat's error codes for a tag that is not closed.
 _UNCLOSED = frozenset(
     expat.errors.codes[text]
     for text in (expat.errors.XML_ERROR_TAG_MISMATCH, expat.errors.XML_ERROR_NO_ELEMENTS)
@@ -253,7 +250,7 @@ class _UrdfReader:
         return self.root
 
     def _not_xml(self, code: int, span: Span) -> Finding:
-        """Return the finding about a place where the text stops being XML."""
+        """Return the finding about the place where the text stops being valid XML."""
         reason = expat.ErrorString(code) or "not XML"
         if not self.stack or code not in _UNCLOSED:
             return finding("TF018", reason, span, help="fix it; other parsers stop here too")

@@ -1,8 +1,8 @@
-"""Comparison of a written URDF with the robot it was written from, value by value.
+"""Comparison of a written URDF with its robot, value by value.
 
-yourdfpy reads the links and joints of the URDF. It ignores other elements (``ros2_control``,
-``gazebo``, ``transmission``), takes the first of duplicate elements, and fills in URDF's defaults
-for missing elements and attributes, so the comparison does not detect faults there.
+yourdfpy reads the links and joints of the URDF. The comparison cannot detect some errors, because
+yourdfpy ignores other elements (``ros2_control``, ``gazebo``, ``transmission``), uses only the
+first of duplicate elements, and fills in URDF's defaults for missing elements and attributes.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from tfcompose.model.files import Target
     from tfcompose.model.robot import Edge, Inertial, Joint, Link, Material, Robot, Shape
 
-#: Poses are written to a picometre, and angles to the noise of computing them; entries of a matrix
-#: are as far off.
+#: Tolerances. Positions are written to a picometre. Angles and matrix entries have rounding errors
+#: of this size.
 FAR_M = FAR_RAD = 1e-11
-#: Moments are written with 12 digits.
+#: Relative tolerance of moments, which are written with 12 digits.
 FAR_MOMENT = 1e-11
 #: Indices of the moments (xx, xy, xz, yy, yz, zz) in the tensor.
 _MOMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -38,8 +38,9 @@ _MOMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Iterator[str]:
     """Yield the differences between the text and the robot.
 
-    It compares links, joints, poses, masses and shapes. ``full`` is as in ``urdf``; the text is
-    the result of that function, or of ``emit``, for the same target.
+    The comparison covers links, joints, poses, masses and shapes. ``text`` is the result of
+    ``urdf`` or ``emit`` for the same target. ``full`` selects the full URDF, not the one for a
+    stock publisher.
     """
     try:
         ET.fromstring(text)  # noqa: S314 (our own text); yourdfpy would mend what is not XML, and go on
@@ -47,27 +48,27 @@ def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Itera
         yield f"it is not XML: {error}"
         return
     try:
-        there = yourdfpy.URDF.load(
+        loaded = yourdfpy.URDF.load(
             BytesIO(text.encode()), build_scene_graph=False, load_meshes=False
         ).robot
     except Exception as error:  # noqa: BLE001 (whatever yourdfpy stumbles over in a text that is no URDF)
         yield f"yourdfpy does not read it: {type(error).__name__}: {error}"
         return
-    if there.name != robot.name:
-        yield f"its name is {there.name}, not {robot.name}"
+    if loaded.name != robot.name:
+        yield f"its name is {loaded.name}, not {robot.name}"
     base = robot.base or ""
     frames = robot.described_frames()
-    links = {link.name: link for link in there.links}
-    joints = {joint.child: joint for joint in there.joints}
+    links = {link.name: link for link in loaded.links}
+    joints = {joint.child: joint for joint in loaded.joints}
     edges = {
         edge.child: edge for edge in robot.edges if edge.child in frames and edge.child != base
     }
-    for about, found, there_named, expected in (
-        ("links", links.keys(), there.links, frames),
-        ("joints to these links", joints.keys(), there.joints, edges.keys()),
+    for about, read, listed, expected in (
+        ("links", links.keys(), loaded.links, frames),
+        ("joints to these links", joints.keys(), loaded.joints, edges.keys()),
     ):
-        wrong = sorted(found ^ expected)
-        if wrong or len(there_named) != len(expected):
+        wrong = sorted(read ^ expected)
+        if wrong or len(listed) != len(expected):
             yield f"{about} are missing, new or there twice: {', '.join(wrong)}"
             return
     for child, edge in edges.items():
@@ -87,7 +88,7 @@ def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Itera
 
 
 def _is_moved(origin: Any, pose: Pose) -> bool:
-    """Whether yourdfpy's 4×4 matrix, None where there is no origin, is another pose."""
+    """Return whether yourdfpy's 4×4 matrix, None for no origin, differs from the pose."""
     if origin is None:
         return (
             math.hypot(*pose.xyz) > FAR_M
@@ -96,30 +97,30 @@ def _is_moved(origin: Any, pose: Pose) -> bool:
     (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = origin.tolist()
     expected = chain(*matrix_from_quat(pose.quat_xyzw))
     far = (
-        abs(element - other)
-        for element, other in zip((a, b, c, d, e, f, g, h, i), expected, strict=True)
+        abs(element - expected_element)
+        for element, expected_element in zip((a, b, c, d, e, f, g, h, i), expected, strict=True)
     )
     return math.dist((x, y, z), pose.xyz) > FAR_M or max(far) > FAR_RAD
 
 
-def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
-    if edge.joint_name and there.name != edge.joint_name:
+def _of_joint(loaded: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
+    if edge.joint_name and loaded.name != edge.joint_name:
         yield f"its name is not {edge.joint_name}"
-    if there.type != kind:
-        yield f"its type is {there.type}, not {kind}"
-    if there.parent != edge.parent:
-        yield f"its parent is {there.parent}, not {edge.parent}"
-    if _is_moved(there.origin, edge.pose):
+    if loaded.type != kind:
+        yield f"its type is {loaded.type}, not {kind}"
+    if loaded.parent != edge.parent:
+        yield f"its parent is {loaded.parent}, not {edge.parent}"
+    if _is_moved(loaded.origin, edge.pose):
         yield "its origin differs"
     joint = edge.joint or edge.free
     if joint is None or kind != joint.type or kind == "floating":
         return
-    axis = tuple(there.axis.tolist())
+    axis = tuple(loaded.axis.tolist())
     if axis != joint.axis:
         yield f"axis is {axis}, not {joint.axis}"
     for tag, expected in _values(joint).items():
-        found = getattr(there, tag)
-        actual = None if found is None else _set_values(found)
+        value = getattr(loaded, tag)
+        actual = None if value is None else _set_values(value)
         if (actual is None) != (expected is None):
             yield f"{tag} is {'missing' if actual is None else 'new'}"
         elif actual != expected:
@@ -127,7 +128,7 @@ def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
 
 
 def _set_values(values: Any) -> dict[str, Any]:
-    """Return the values that a dataclass holds; yourdfpy leaves those of ``dynamics`` as text."""
+    """Return the fields of a dataclass. yourdfpy leaves the values of ``dynamics`` as text."""
     present = {}
     for field in fields(values):
         value = getattr(values, field.name)
@@ -137,9 +138,9 @@ def _set_values(values: Any) -> dict[str, Any]:
 
 
 def _values(joint: Joint) -> dict[str, dict[str, Any] | None]:
-    """Return what is to stand in the joint by yourdfpy's names.
+    """Return the expected values in the joint, by yourdfpy's names.
 
-    Values, or None where it is not to be there.
+    None for an element that the joint must not have.
     """
     limit, mimic = joint.limit, joint.mimic
     rates = {
@@ -161,22 +162,22 @@ def _values(joint: Joint) -> dict[str, dict[str, Any] | None]:
 
 
 def _of_link(
-    there: yourdfpy.Link, link: Link | None, body: Inertial | None, target: Target
+    loaded: yourdfpy.Link, link: Link | None, body: Inertial | None, target: Target
 ) -> Iterator[str]:
-    if (there.inertial is None) != (body is None):
-        yield f"its mass is {'missing' if there.inertial is None else 'new'}"
-    elif body is not None and _is_another_body(there.inertial, body):
+    if (loaded.inertial is None) != (body is None):
+        yield f"its mass is {'missing' if loaded.inertial is None else 'new'}"
+    elif body is not None and _is_another_body(loaded.inertial, body):
         yield "its mass differs"
     visuals, collisions = (link.visuals, link.collisions) if link else ((), ())
-    for tag, found, shapes in (
-        ("visual", there.visuals, visuals),
-        ("collision", there.collisions, collisions),
+    for tag, read, shapes in (
+        ("visual", loaded.visuals, visuals),
+        ("collision", loaded.collisions, collisions),
     ):
         expected = [(shape, solid) for shape in shapes for solid in _solids(shape, target)]
-        if len(found) != len(expected):
-            yield f"it has {len(found)} {tag} elements, not {len(expected)}"
+        if len(read) != len(expected):
+            yield f"it has {len(read)} {tag} elements, not {len(expected)}"
             continue
-        for element, (shape, (kind, values, pose)) in zip(found, expected, strict=True):
+        for element, (shape, (kind, values, pose)) in zip(read, expected, strict=True):
             if _form(getattr(element.geometry, kind)) != values or _is_moved(element.origin, pose):
                 yield f"a {kind} of its {tag} differs"
             if tag == "visual" and _paint(element.material) != _expected_paint(
@@ -185,21 +186,21 @@ def _of_link(
                 yield f"the material of a {kind} differs"
 
 
-def _is_another_body(there: yourdfpy.Inertial, body: Inertial) -> bool:
-    if there.mass is None or there.inertia is None:
+def _is_another_body(loaded: yourdfpy.Inertial, body: Inertial) -> bool:
+    if loaded.mass is None or loaded.inertia is None:
         return True
-    rows = there.inertia.tolist()
+    rows = loaded.inertia.tolist()
     off = max(abs(rows[i][j] - value) for (i, j), value in zip(_MOMENTS, body.tensor, strict=True))
     is_other_tensor = off > FAR_MOMENT * max(map(abs, body.tensor))
-    return there.mass != body.mass or is_other_tensor or _is_moved(there.origin, body.pose)
+    return loaded.mass != body.mass or is_other_tensor or _is_moved(loaded.origin, body.pose)
 
 
-def _paint(there: yourdfpy.Material | None) -> dict[str, Any]:
-    if there is None:
+def _paint(loaded: yourdfpy.Material | None) -> dict[str, Any]:
+    if loaded is None:
         return {}
-    colour = {} if there.color is None else {"rgba": tuple(there.color.rgba.tolist())}
-    image = {} if there.texture is None else {"texture": there.texture.filename}
-    return {"name": there.name} | colour | image
+    colour = {} if loaded.color is None else {"rgba": tuple(loaded.color.rgba.tolist())}
+    image = {} if loaded.texture is None else {"texture": loaded.texture.filename}
+    return {"name": loaded.name} | colour | image
 
 
 def _expected_paint(material: Material | None, target: Target) -> dict[str, Any]:
@@ -210,21 +211,21 @@ def _expected_paint(material: Material | None, target: Target) -> dict[str, Any]
     return {"name": material.name} | colour | image
 
 
-def _form(there: Any) -> dict[str, Any]:
-    """Return the values of a solid; none where there is none of the kind."""
-    if there is None:
+def _form(solid: Any) -> dict[str, Any]:
+    """Return the values of a solid; empty without a solid of this kind."""
+    if solid is None:
         return {}
     values = {}
-    for key, value in vars(there).items():
+    for key, value in vars(solid).items():
         if value is not None:
             values[key] = tuple(value.tolist()) if hasattr(value, "tolist") else value
     return values
 
 
 def _solids(shape: Shape, target: Target) -> Iterator[tuple[str, dict[str, Any], Pose]]:
-    """Yield the solids that a shape is in URDF, which has no capsule.
+    """Yield kind, values and pose of each solid that represents the shape in URDF.
 
-    Kind, values and pose of each.
+    A capsule consists of several solids, because URDF has no capsule.
     """
     size, radius = shape.size, {"radius": shape.size[0]}
     if shape.mesh:

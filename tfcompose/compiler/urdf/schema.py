@@ -1,7 +1,7 @@
 """The vocabulary of URDF: elements, attributes, shapes, joint types and attribute values.
 
-An unknown word or an invalid value is a finding. Source: the URDF XML specification of ROS (link,
-joint, robot). The contents of transmissions, Gazebo and ros2_control blocks are not checked.
+Unknown words and invalid values become findings. Source: the URDF XML specification of ROS (link,
+joint, robot). The contents of transmission, Gazebo and ros2_control blocks are not checked.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 JOINT_TYPES = (*MOVING, "fixed", *FREE)
 
-#: Each element with its attributes and the elements in it.
+#: The attributes and the child elements of each element.
 ELEMENTS: dict[str, tuple[str, str]] = {
     "robot": ("name version", "link joint material transmission gazebo ros2_control sensor"),
     "link": ("name type", "inertial visual collision"),
@@ -58,7 +58,7 @@ ELEMENTS: dict[str, tuple[str, str]] = {
     "safety_controller": ("soft_lower_limit soft_upper_limit k_position k_velocity", ""),
 }
 
-#: The components of a tensor, in the order in which ``Inertial`` holds them.
+#: The components of a tensor, in the order of ``Inertial``.
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 #: Size attributes of each primitive shape, each with its number of values.
@@ -69,20 +69,20 @@ SIZES: dict[str, tuple[tuple[str, int], ...]] = {
     "capsule": (("radius", 1), ("length", 1)),
 }
 
-#: Elements next to links, joints and materials that are other programs' business.
+#: Elements below <robot> that only other programs read.
 OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
 
-#: Elements of xacro that URDF does not have.
+#: Elements that xacro has and URDF does not have.
 _XACRO = frozenset({"insert_block", "include", "property", "if", "unless", "macro"})
-#: A word as near as this to a known one is taken for a misspelling of it.
+#: A word with at least this similarity to a known word counts as a misspelling.
 _MISSPELT = 0.8
 
 
 def unknown_words(root: Element) -> Iterator[Finding]:
     """Yield a finding for each element and attribute that URDF does not have.
 
-    A misspelling of a known one is an error. Others may be an extension and are warnings. Directly
-    below <robot> they are accepted.
+    A misspelling is an error. Any other unknown word may be an extension, so it is a warning.
+    Directly below <robot>, unknown elements other than misspellings are accepted.
     """
     waiting = [root]
     while waiting:
@@ -107,7 +107,7 @@ def unknown_words(root: Element) -> Iterator[Finding]:
 def _unexpanded_finding(element: Element) -> Finding:
     """Return the finding about an element that xacro should have replaced.
 
-    Readers of URDF ignore it.
+    URDF readers ignore such an element.
     """
     if element.tag in _XACRO:
         message = f"<{element.tag}> is a tag of xacro, not expanded without its prefix"
@@ -117,35 +117,35 @@ def _unexpanded_finding(element: Element) -> Finding:
 
 
 def _unknown(
-    what: str, name: str, known: list[str], element: Element, attribute: str = ""
+    what: str, name: str, names: list[str], element: Element, attribute: str = ""
 ) -> Finding:
-    near = nearest(name, known)
+    near = nearest(name, names)
     advice = (
         f"did you mean {near}?"
         if near
-        else f"allowed here: {', '.join(known)}"
-        if known
+        else f"allowed here: {', '.join(names)}"
+        if names
         else "nothing is allowed here"
     )
     span = element.value_span(attribute) if attribute else element.span
-    wrong = near and (slip_of(name, known) or nearest(name, known, _MISSPELT))
+    wrong = near and (slip_of(name, names) or nearest(name, names, _MISSPELT))
     return finding(
         "TF720", f"unknown {what}", span, help=advice, severity="error" if wrong else "warning"
     )
 
 
-#: Products of three smaller numbers stay in the range of floats.
+#: Products of three numbers below this limit do not overflow a float.
 HUGE = 1e30
 
 
 @dataclass(slots=True)
 class AttributeReader:
-    """Read attributes and collect findings about them."""
+    """Reads attributes and collects findings about them."""
 
     findings: list[Finding] = field(default_factory=list)
     #: Whether quat_xyzw is allowed.
     has_quaternions: bool = False
-    #: The number of invalid values. A warning is not counted, because its value is kept.
+    #: The number of invalid values. Warnings are not counted, because their values are kept.
     refused: int = 0
 
     def refuse(
@@ -156,7 +156,7 @@ class AttributeReader:
         self.refused += severity == "error"
 
     def text(self, element: Element, name: str, example: str) -> str:
-        """Return a required attribute, or an empty text."""
+        """Return a required attribute; add a finding and return "" if it is missing."""
         value = element.attributes.get(name, "")
         if not value:
             self.refuse(f"<{element.tag}> has no {name}", element.span, f"for example {example}")
@@ -167,7 +167,7 @@ class AttributeReader:
     ) -> tuple[float, ...]:
         """Return an attribute's numbers, as many as ``default`` has.
 
-        ``default`` replaces missing or invalid ones.
+        If the attribute is missing or invalid, return ``default``.
         """
         if element is None or name not in element.attributes:
             return default
@@ -205,9 +205,9 @@ class AttributeReader:
         return self.numbers(element, name, (0.0,))[0]
 
     def read_bound(self, element: Element, name: str) -> float | None:
-        """Return an attribute's number that is a limit; None without one.
+        """Return an attribute's number that is a limit; None without a limit.
 
-        A finite limit beyond ``HUGE`` is reduced to it, with a warning.
+        A finite limit beyond ``HUGE`` is reduced to ``HUGE``, with a warning.
         """
         try:
             value = float(element.attributes.get(name, ""))
@@ -221,7 +221,7 @@ class AttributeReader:
         return used
 
     def pose(self, parent: Element) -> Pose:
-        """Return the pose in the element's origin."""
+        """Return the pose in the element's <origin>."""
         origin = parent.first("origin")
         x, y, z = self.numbers(origin, "xyz", (0.0, 0.0, 0.0))
         if origin is not None and "quat_xyzw" in origin.attributes:
@@ -233,7 +233,7 @@ class AttributeReader:
         return Pose((x, y, z), normalise(quat_from_rpy(roll, pitch, yaw)))
 
     def _quaternion(self, origin: Element) -> Quaternion:
-        """Return the rotation given as a quaternion, which URDF has since version 1.1."""
+        """Return the rotation from a quaternion, which URDF supports since version 1.1."""
         before, span = self.refused, origin.value_span("quat_xyzw")
         x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
         if not any((x, y, z, w)):
@@ -256,7 +256,7 @@ class AttributeReader:
 def version_of(root: Element, values: AttributeReader) -> tuple[int, ...]:
     """Return the URDF version that the document declares.
 
-    A version that parsers of ROS 2 Jazzy reject is a finding.
+    If parsers of ROS 2 Jazzy reject the version, add a finding.
     """
     text = root.attributes.get("version", "1.0")
     version = tuple(map(int, text.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", text) else ()
@@ -271,7 +271,7 @@ def version_of(root: Element, values: AttributeReader) -> tuple[int, ...]:
 
 
 def _advice(text: str, count: int) -> str:
-    """Return advice for a text that is not this many numbers."""
+    """Return advice for a text that does not consist of ``count`` numbers."""
     if "${" in text or "$(" in text:
         return "xacro was not expanded here: use the .xacro file"
     if "," in text:

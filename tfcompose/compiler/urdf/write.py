@@ -1,11 +1,12 @@
 """URDF of a robot: everything below its base.
 
-Conventions follow the URDF XML specification: a joint's origin is the pose of its child link in
-its parent link, rpy are fixed-axis angles, an axis is given in the joint's frame.
+Conventions follow the URDF XML specification. A joint's origin is the pose of its child link in
+its parent link, rpy are fixed-axis angles, and an axis is in the joint's frame.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields, replace
 from functools import lru_cache
 from textwrap import dedent, indent
@@ -36,16 +37,17 @@ if TYPE_CHECKING:
     from tfcompose.model.robot.hardware import Block, Hardware, HardwareComponent, Interface
 
 _IDENTITY = Pose()
+_ORIGIN_LINE = re.compile(r"\A    <origin [^\n]*/>\n")
 #: The value of an attribute, in quotes. Names repeat, in one file and from file to file.
 quoted = lru_cache(maxsize=1 << 16)(quoteattr)
 
 
 def urdf(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[str, str]:
-    """Return the URDF below ``robot.base``, in full and for a stock publisher.
+    """Return the URDF below ``robot.base``: the full URDF, and the URDF for a stock publisher.
 
-    The base must exist, in a valid tree. The full URDF has every edge as it is, whoever publishes
-    it. For a stock robot_state_publisher, edges of other owners are floating joints, which that
-    node ignores. ``target`` says how files are addressed.
+    The base must exist and be in a valid tree. The full URDF describes every edge. In the URDF for
+    a stock robot_state_publisher, edges of other owners are floating joints, which that node
+    ignores. ``target`` holds the form of file addresses.
     """
     writer = UrdfWriter(target)
     head = ('<?xml version="1.0"?>', f"<robot name={quoted(robot.name)}>")
@@ -62,18 +64,18 @@ def block_lines(blocks: Iterable[Block]) -> list[str]:
 class UrdfWriter:
     """Writes links, joints and hardware as lines.
 
-    Subclasses can change the spelling of names and values.
+    Subclasses can change how names and values are written.
     """
 
     def __init__(self, target: Target = AS_IN_SOURCE) -> None:
         self.target = target
 
     def name(self, text: str) -> str:
-        """Return the quoted name of a link, joint, material or piece of hardware."""
+        """Return the quoted name of a link, joint, material or hardware component."""
         return quoted(text)
 
     def value(self, text: str) -> str:
-        """Return the value of any other attribute in quotes."""
+        """Return the quoted value of any other attribute."""
         return quoted(text)
 
     def content(self, text: str) -> str:
@@ -85,15 +87,15 @@ class UrdfWriter:
         return self.content(text)
 
     def address(self, asset: Asset) -> str:
-        """Return the address of a mesh or texture, as an attribute's value in quotes."""
+        """Return the quoted address of a mesh or texture."""
         return quoted(self.target.address(asset))
 
     def body(self, robot: Robot) -> tuple[list[str], list[str]]:
-        """Return the URDF elements below ``robot.base``, in full and for a stock publisher.
+        """Return the elements below ``robot.base``: the full URDF, and that for a stock publisher.
 
-        A frame of unknown pose is omitted with the frames below it, and a comment says so. For a
-        stock publisher the root has no inertia: KDL, which that node uses to read URDF, supports
-        none there and warns at each start.
+        A frame with an unknown pose is omitted together with the frames below it, and a comment
+        reports this. For a stock publisher the root link has no inertia, because KDL, its URDF
+        reader, ignores the inertia of a root link and warns at each start.
 
         Raises:
             ValueError: if the robot has no base.
@@ -149,11 +151,10 @@ class UrdfWriter:
         return lines
 
     def _geometries(self, shape: Shape) -> list[tuple[str, Pose]]:
-        """Return the solids that the shape consists of, each with its pose.
+        """Return the solids of the shape, each with its pose.
 
-        URDF has no capsule in the versions that ROS 2 Jazzy reads, and parsers reject the whole
-        robot for one: it is written as the cylinder and the two spheres that together are the same
-        solid.
+        A capsule is written as a cylinder and two spheres, which together form the same solid. In
+        ROS 2 Jazzy, URDF has no capsule, and a parser would reject the entire robot.
         """
         if shape.kind == "box":
             return [(f'<box size="{numbers(shape.size)}"/>', shape.pose)]
@@ -176,7 +177,7 @@ class UrdfWriter:
         return f"      <material name={self.name(material.name)}>{inside}</material>"
 
     def joint(self, edge: Edge, name: str, kind: str) -> list[str]:
-        """Return the joint of this type for an edge."""
+        """Return the lines of a joint of type ``kind`` for the edge."""
         lines = [
             f'  <joint name={self.name(name)} type="{kind}">',
             f"    <parent link={self.name(edge.parent)}/>",
@@ -191,7 +192,7 @@ class UrdfWriter:
     def _motion(self, joint: Joint) -> list[str]:
         lines = [f'    <axis xyz="{numbers(joint.axis)}"/>']
         limit, mimic = joint.limit, joint.mimic
-        if joint.type in BOUNDED or limit:  # URDF requires effort and velocity of these
+        if joint.type in BOUNDED or limit:  # URDF requires effort and velocity in these cases
             effort, velocity = (
                 (limit.effort or 0.0, limit.velocity or 0.0) if limit else (0.0, 0.0)
             )
@@ -223,7 +224,7 @@ class UrdfWriter:
         return lines
 
     def hardware(self, robot: Robot) -> list[str]:
-        """Return the robot's hardware components, as ros2_control reads them."""
+        """Return the robot's hardware components in the form that ros2_control reads."""
         return [line for hardware in robot.hardware for line in self._hardware(hardware)]
 
     def _hardware(self, hardware: Hardware) -> list[str]:
@@ -288,7 +289,7 @@ def _unknown(edge: Edge) -> str:
 
 
 def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:
-    """Yield the edges below ``root``, parents first, siblings as declared; without recursion."""
+    """Yield the edges below ``root``, parents first, in order of declaration."""
     waiting = list(reversed(children.get(root, [])))
     while waiting:
         edge = waiting.pop()
@@ -299,7 +300,7 @@ def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:
 def _joint_names(edges: list[Edge]) -> list[str]:
     """Return a name for each edge's joint.
 
-    The user's, or ``parent_to_child``, longer where that is taken.
+    By default it is ``parent_to_child``, with underscores added if that name is already used.
     """
     names_used = {edge.joint_name for edge in edges}
     names = []
@@ -313,24 +314,44 @@ def _joint_names(edges: list[Edge]) -> list[str]:
 
 
 def joint_type(edge: Edge) -> str:
-    """Return URDF's joint type of the edge."""
+    """Return the URDF joint type of the edge."""
     joint = edge.joint or edge.free
     if joint:
         return joint.type
-    # A sensor is one body, even where its driver sends what was calibrated inside it again and
-    # again.
+    # A sensor is a rigid body, even if its driver repeatedly publishes calibrated inner edges on
+    # /tf.
     inside = edge.sensor and not edge.declared
     return "floating" if edge.kind == "dynamic" and not inside else "fixed"
 
 
 def _origin(pose: Pose, before: str) -> list[str]:
-    """Return the origin element, or none for the identity."""
+    """Return the <origin> element, nothing for the identity."""
     if pose == _IDENTITY:
         return []
     return [
         f'{before}<origin xyz="{numbers(clean_xyz(pose.xyz))}"'  # noqa: ISC004
         f' rpy="{numbers(clean_rpy(pose.quat_xyzw))}"/>'
     ]
+
+
+def with_pose(text: str, parent: str, child: str, pose: Pose) -> str:
+    """Return a URDF of this module with another pose of ``child`` in ``parent``.
+
+    Both may have a prefix that the URDF leaves out. An edge that the URDF does not have changes
+    nothing.
+    """
+    for length in range(len(child)):
+        if not parent.startswith(child[:length]):
+            break
+        ends = (
+            f"    <parent link={quoted(parent[length:])}/>\n"
+            f"    <child link={quoted(child[length:])}/>\n"
+        )
+        before, separator, after = text.partition(ends)
+        if separator:
+            origin = "".join(f"{line}\n" for line in _origin(pose, "    "))
+            return f"{before}{ends}{origin}{_ORIGIN_LINE.sub('', after, count=1)}"
+    return text
 
 
 def _inertial(inertial: Inertial) -> list[str]:
@@ -346,7 +367,7 @@ def _inertial(inertial: Inertial) -> list[str]:
 
 
 def _element(tag: str, values: dict[str, float | None]) -> str:
-    """Return an element in a joint with the numbers that are not None."""
+    """Return an element of a joint, with the numbers that are not None."""
     attributes = " ".join(
         f'{name}="{number(value)}"' for name, value in values.items() if value is not None
     )

@@ -1,6 +1,6 @@
-"""Macros of a xacro file: their parameters, a call of one, and the result.
+"""Macros of a xacro file: their parameters, calls of a macro, and the expansion.
 
-``expand`` runs xacro, ``macro`` writes a macro.
+``expand`` runs xacro. ``macro`` writes a macro.
 """
 
 from __future__ import annotations
@@ -13,34 +13,34 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
 
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
-#: Definition of a macro in a file, up to its name, and the macro's parameters in that tag.
+#: The start tag of a macro's definition up to its name, and the parameters in that tag.
 _MACRO = re.compile(r"""<xacro:macro\s[^>]{0,4000}?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
-#: Characters of a tag.
+#: Maximum number of characters of a tag.
 _LONGEST = 100_000
 _PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 
 
 @dataclass(frozen=True, slots=True)
 class Expansion:
-    """The expanded text of a xacro file, and the places where it was written."""
+    """The expanded text of a xacro file, and the places where its elements are written."""
 
     text: str
-    #: The files that ``places`` and ``comments`` refer to by index.
+    #: Files; ``places`` and ``comments`` refer to them by index.
     files: tuple[str, ...]
-    #: The place of each element in the order of the text: file index, line, column from 0. None
-    #: for an element that is in no file.
+    #: The place of each element in document order: file index, line, column from 0. None for an
+    #: element that is in no file.
     places: tuple[tuple[int, int, int] | None, ...]
-    #: The places of the comments that allow findings and were kept.
+    #: The places of comments that allow findings, without comments that xacro left out.
     comments: tuple[tuple[int, int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """A robot file's use of a xacro file, as a whole or through one macro."""
+    """A robot file's use of a xacro file, as a complete file or through one of its macros."""
 
-    #: The place that names the file, in the robot file or on the command line.
+    #: The span of the file's name, in the robot file or on the command line.
     span: Span
-    #: A macro that the file defines; empty: the whole file.
+    #: The macro to call; empty for the complete file.
     macro: str = ""
     #: The macro's text parameters, by name.
     words: dict[str, str] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class Use:
     blocks: tuple[str, ...] = ()
     #: Files that the macro needs included.
     files: tuple[str, ...] = ()
-    #: The place in the robot file of each entry of ``words``, by name.
+    #: The span in the robot file of each entry of ``words``, by name.
     places: dict[str, Span] = field(default_factory=dict)
 
 

@@ -1,8 +1,8 @@
-"""xacro in a separate, confined process, because it evaluates arbitrary expressions.
+"""xacro in a separate, sandboxed process, because xacro evaluates arbitrary expressions.
 
-It cannot open files. It requests packages, texts and folder listings from its parent process, then
-answers with xacro's result or the reason why it stopped. It imports only xacro and tfcompose's
-sandbox, because each expansion starts one.
+This process cannot open files. It requests packages, texts and folder listings from its parent
+process. Then it answers with xacro's result, or with the reason why xacro stopped. It imports only
+xacro and tfcompose's sandbox, because every expansion starts such a process.
 """
 
 from __future__ import annotations
@@ -36,17 +36,19 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType, TracebackType
 
-#: Processor time for one expression, in seconds.
+#: Maximum CPU time for an expression, in seconds.
 MOST_EXPRESSION_S = 5.0
-#: The process ends itself this long before it would be ended, and reports what it was doing.
+#: The process stops this long before the parent would kill it, so that it can report its state; in
+#: seconds.
 _SPARE_S = 1.0
-#: Maximum size of the resulting text.
+#: Maximum size of the expanded text.
 MOST_BYTES = 16_000_000
-#: Elements that are made on the way; most of what a macro holds can be left out again.
+#: Maximum number of elements created during expansion, including elements that macros leave out
+#: later.
 MOST_ELEMENTS = 1_000_000
 MOST_FILES_OPEN = 40
 
-#: Under this key nodes have their place: the file's number, line and column, which counts from 0.
+#: The key under which a node stores its place: file index, line, and column from 0.
 _PLACE = "place"
 _ALLOW = "tfcompose:"
 
@@ -60,11 +62,11 @@ class MissingError(LookupError):
 
 
 class OutsideDocumentError(Exception):
-    """A file is outside the trees that the document may read."""
+    """A file is outside the folder trees that the document may read."""
 
 
 class UnsafeError(Exception):
-    """An expression uses names that give access outside its sandbox."""
+    """An expression uses names that could give access beyond the sandbox."""
 
 
 class XacroFiles:
@@ -79,12 +81,12 @@ class XacroFiles:
         return folder
 
     def open(self, path: str) -> io.StringIO:
-        """Return the text of a file, open for reading.
+        """Return an open text stream with the file's text.
 
         Raises:
-            OSError: if it cannot be read.
-            OutsideError: if it may not be read.
-            UnicodeDecodeError: if it is not UTF-8.
+            OSError: if the file cannot be read.
+            OutsideDocumentError: if access to the file is not permitted.
+            UnicodeDecodeError: if the file is not UTF-8.
         """
         count = self._ask("read", path)["bytes"]
         return io.StringIO(self._channel.receive_bytes(count).decode("utf-8-sig"))
@@ -93,7 +95,7 @@ class XacroFiles:
         """Return the paths that match a pattern, as ``glob.glob`` does.
 
         Raises:
-            OutsideError: if a folder may not be listed.
+            OutsideDocumentError: if access to a folder is not permitted.
         """
         if not any(character in pattern for character in "*?["):
             return [pattern]
@@ -108,7 +110,7 @@ class XacroFiles:
     def _names_in(self, folder: str) -> list[str]:
         try:
             names: list[str] = self._ask("list", folder)["names"]
-        except OSError:  # not there, or no folder
+        except OSError:  # missing, or not a folder
             return []
         return names
 
@@ -123,13 +125,13 @@ class XacroFiles:
 
 
 class _Cloned:
-    """Gives clones of a node its place, and counts them."""
+    """Copies a node's place to its clones, and counts the clones."""
 
     def __init__(self) -> None:
         self.elements = 0
 
     def handle(self, _operation: int, key: str, data: Any, source: Any, clone: Any) -> None:
-        """Be told by the DOM that a node was cloned."""
+        """Handle the DOM's notification that a node was cloned."""
         clone.setUserData(key, data, self)
         if source.nodeType == Node.ELEMENT_NODE:
             self.count()
@@ -141,7 +143,7 @@ class _Cloned:
 
 
 class _Builder(expatbuilder.ExpatBuilderNS):
-    """Builds a document whose elements, and comments that allow findings, know their places."""
+    """Builds a document and stores the places of elements and of comments that allow findings."""
 
     def __init__(self, file: int | None, cloned: _Cloned) -> None:
         super().__init__()
@@ -165,7 +167,7 @@ class _Builder(expatbuilder.ExpatBuilderNS):
 
 
 class XacroRun:
-    """Runs xacro on a request; ``note`` records what is being evaluated."""
+    """Runs xacro on a request. ``note`` records the expression under evaluation."""
 
     def __init__(self, files: XacroFiles, note: Callable[[str], None]) -> None:
         self._reader = files
@@ -175,12 +177,12 @@ class XacroRun:
         self._noted = ""
 
     def expand(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Return xacro's document with the places of its elements, or why there is none."""
+        """Return xacro's document with the places of its elements, or the reason of a failure."""
         try:
             with self._hook_xacro():
                 document = self._document(request)
                 for node in document.childNodes:
-                    if node.nodeType == Node.COMMENT_NODE:  # xacro's own names the file
+                    if node.nodeType == Node.COMMENT_NODE:  # xacro's comment names the file
                         node.data = node.data.encode("utf-8", "replace").decode()
                 text = document.toprettyxml(indent="  ")
                 text.encode()
@@ -200,17 +202,14 @@ class XacroRun:
         file, arguments = request["file"], request["arguments"]
         if request["call"] is None:
             return xacro.process_file(file, mappings=arguments)
-        xacro.init_stacks(file)  # relative includes begin in the file's folder
+        xacro.init_stacks(file)  # relative includes start in the file's folder
         document = _Builder(None, self._cloned).parseString(request["call"])
         xacro.process_doc(document, mappings=arguments)
         return document
 
     @contextmanager
     def _hook_xacro(self) -> Iterator[None]:
-        """Put this between xacro and what it opens, parses, evaluates and looks for.
-
-        It offers no other way.
-        """
+        """Replace the functions with which xacro opens, parses, evaluates and looks up."""
         hooks = {
             (xacro, "open"): self._reader.open,
             (xacro, "glob"): SimpleNamespace(glob=self._reader.glob),
@@ -226,8 +225,8 @@ class XacroRun:
         try:
             yield
         finally:
-            for (module, name), own in before.items():
-                setattr(module, name, own) if own else delattr(module, name)
+            for (module, name), original in before.items():
+                setattr(module, name, original) if original else delattr(module, name)
 
     def _parse(self, document: Any, file: str) -> Any:
         if document is not None:
@@ -253,7 +252,7 @@ class XacroRun:
         return folder
 
     def _evaluate(self, evaluate: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
-        """Return xacro's evaluation of a text with a time limit that Python cannot enforce."""
+        """Wrap xacro's evaluation with a time limit that the expression cannot intercept."""
 
         def evaluated(text: str, symbols: Any) -> Any:
             if "$" not in text:
@@ -263,7 +262,7 @@ class XacroRun:
             self._note(text)
             left = signal.setitimer(
                 signal.ITIMER_VIRTUAL, MOST_EXPRESSION_S
-            )  # no handler: it ends the process
+            )  # the signal has no handler, so it ends the process
             try:
                 return evaluate(text, symbols)
             finally:
@@ -273,9 +272,9 @@ class XacroRun:
         return evaluated
 
     def _places(self, document: Any) -> tuple[list[Any], list[Any]]:
-        """Return the place of each element, in the order of the text, None where it is in no file.
+        """Return the place of each element, in document order, and the places of comments.
 
-        And of comments.
+        The place is None for an element that is in no file.
         """
         places, comments, waiting = [], [], [document]
         while waiting:
@@ -288,11 +287,11 @@ class XacroRun:
         return places, [place for place in dict.fromkeys(comments) if place]
 
     def _failure(self, error: Exception) -> dict[str, Any]:
-        """Return xacro's complaint, or that of something it called, and what it was doing."""
+        """Return the reason why xacro stopped, and what it was processing."""
         chain: list[Any] = [error]
         while (
             getattr(chain[-1], "exc", None) is not None
-        ):  # xacro wraps what it calls, again and again
+        ):  # xacro wraps exceptions, possibly several times
             chain.append(chain[-1].exc)
         root = chain[-1]
         kind, reason = "refused", _reason(chain) or type(error).__name__
@@ -308,7 +307,7 @@ class XacroRun:
         elif isinstance(root, LimitError):
             kind, reason = "limit", str(root)
         elif isinstance(root, MemoryError):
-            take_spare_memory()  # to say so
+            take_spare_memory()  # the message needs memory
             parts = [
                 f"xacro needs more than {MOST_MEMORY_BYTES >> 30} GB of memory",
                 *_suffixes(chain),
@@ -331,20 +330,20 @@ class XacroRun:
         }
 
     def _node_at(self, trace: TracebackType | None) -> tuple[str, int, int] | None:
-        """Return the place of the innermost element that xacro was busy with, or None."""
-        found, files = None, list(self._files)
+        """Return the place of the innermost element that xacro was processing, or None."""
+        innermost, files = None, list(self._files)
         while trace is not None:
             node = _busy_with(trace.tb_frame)
             place = node.getUserData(_PLACE) if node is not None else None
-            found = place or found
+            innermost = place or innermost
             trace = trace.tb_next
-        return (files[found[0]], *found[1:]) if found else None
+        return (files[innermost[0]], *innermost[1:]) if innermost else None
 
 
 def _busy_with(frame: FrameType) -> Any | None:
-    """Return the element that a function of xacro has as its argument, or that it has come to.
+    """Return the element that a function of xacro is processing.
 
-    None for others.
+    None for a function of another module.
     """
     if frame.f_globals.get("__name__") != "xacro":
         return None
@@ -357,21 +356,21 @@ def _busy_with(frame: FrameType) -> Any | None:
 
 
 def _reason(chain: list[Any]) -> str:
-    """Return the message of a chain of exceptions in one line.
+    """Return the message of a chain of exceptions on a single line.
 
-    The last one is the cause of the others.
+    The last exception caused the others.
     """
     root = chain[-1]
     if isinstance(root, OSError):
         parts = [f"{root.strerror}: {root.filename}"]
     else:
         heads = [str(error.args[0]) for error in chain[:-1] if error.args and error.args[0]]
-        own = (
+        reason = (
             str(root)
             if hasattr(root, "suffix") or "line" in str(root)
             else f"{type(root).__name__}: {root}"
         )
-        parts = [*(head for head in heads if str(root) not in head), own]
+        parts = [*(head for head in heads if str(root) not in head), reason]
         parts += _suffixes(chain)
     return " ".join(" ".join(parts).split())
 
@@ -384,7 +383,7 @@ def _suffixes(chain: list[Any]) -> list[str]:
     ]
 
 
-#: Attributes by which generators and tracebacks lead to the functions that evaluate them.
+#: Attributes of generators and tracebacks that lead to frames, and so out of the sandbox.
 _FRAMES = frozenset(
     {
         "ag_code",
@@ -406,7 +405,7 @@ _FRAMES = frozenset(
 
 
 def _with_safe_names(evaluate: Callable[..., Any]) -> Callable[..., Any]:
-    """Return xacro's evaluation of an expression, for names in lambdas and generators, too."""
+    """Wrap xacro's evaluation with a check of names, including names in lambdas and generators."""
 
     def evaluated(expression: str, *symbols: Any) -> Any:
         code = compile(expression.strip(), "<expression>", "eval")
@@ -419,7 +418,7 @@ def _with_safe_names(evaluate: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _names_in(code: CodeType) -> Iterator[str]:
-    """Yield the names that code uses, and those of the code in it."""
+    """Yield the names in the code and in nested code."""
     yield from (*code.co_names, *code.co_varnames, *code.co_freevars)
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -427,7 +426,7 @@ def _names_in(code: CodeType) -> Iterator[str]:
 
 
 def main(reads: int, writes: int, noted: int) -> None:
-    """Serve one request; ``noted`` is a file that records what is being evaluated."""
+    """Serve a single request; ``noted`` is a file that records the expression under evaluation."""
     channel = Channel(reads, writes)
     request = channel.receive()
     limit(request["wall_s"])
@@ -440,7 +439,7 @@ def main(reads: int, writes: int, noted: int) -> None:
     with mmap.mmap(noted, 0) as kept:
         missing = [] if request["is_trusted"] else confine(None)
         channel.send({"missing": missing})
-        if request["is_strict"] and "seccomp" in missing:  # which alone keeps it from files
+        if request["is_strict"] and "seccomp" in missing:  # only seccomp prevents access to files
             os._exit(0)
 
         def note(text: str) -> None:
@@ -450,4 +449,4 @@ def main(reads: int, writes: int, noted: int) -> None:
         answer = XacroRun(XacroFiles(channel), note).expand(request)
         sys.stdout.flush()
         channel.send({"answer": answer})
-    os._exit(0)  # nothing is left to be done, and a large document takes long to be freed
+    os._exit(0)  # nothing remains to be done, and freeing a large document takes long

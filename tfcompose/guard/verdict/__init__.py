@@ -1,6 +1,6 @@
 """Comparison of observations with the plan, for the guard, doctor, verify and monitor.
 
-Pure functions over observations; ages and gaps are seconds, rates hertz. The guard judges message
-by message, verify edge by edge, doctor publisher by publisher, with the same codes and in the same
-words.
+All functions are pure functions of observations. Ages and gaps are in seconds, rates in Hz. The
+guard judges each message, verify judges each edge, and doctor judges each publisher. They use the
+same codes and the same texts.
 """

@@ -1,7 +1,7 @@
 """Checks whether a tree serves its consumers: scans, points, images and joint states.
 
-A message with a frame and a stamp needs that frame at that time, and a moving joint needs its
-state.
+A message with a frame and a stamp requires the pose of the frame at that time. A moving joint
+requires its joint state.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ if TYPE_CHECKING:
 
 
 KEPT_S = KEPT_NS / 1e9
-#: Stamps that are older on arrival make lookups at the current time, and of new data, fail for
-#: this time; costmaps wait 0.3 s.
+#: If stamps are older on arrival, in seconds, lookups at the current time or for new data fail for
+#: that time. Costmaps wait for 0.3 s.
 LATE_S = 0.3
-#: Listeners rarely wait longer than this for a transform.
+#: Listeners rarely wait longer for a transform, in seconds.
 LACK_S = 0.3
-#: A clock, or a driver, that is ahead by more.
+#: If stamps are ahead by more, in seconds, the clock or the driver is wrong.
 AHEAD_S = 0.05
-#: A clock that is farther off is another clock.
+#: If stamps are farther off, in seconds, they come from another clock.
 HOUR_S = 3600.0
 FEWEST = 3
 
 
 def data_frame_unknown(state: TreeState) -> Iterator[Finding]:
-    """Sensor data arrive in a frame that is not in the tree."""
+    """Sensor data arrive with a frame that is not in the tree."""
     frames = {frame for edge in state.taken for frame in (edge.parent, edge.child)}
     for each in state.stamped:
         if each.frame in frames or not frames:
@@ -79,7 +79,7 @@ def data_frame_unknown(state: TreeState) -> Iterator[Finding]:
 
 
 def data_beyond_tf(state: TreeState) -> Iterator[Finding]:
-    """The stamps of data and of the tree do not meet: every lookup for them extrapolates."""
+    """Stamps of data and of the tree do not overlap, so every lookup extrapolates."""
     simulated = state.simulated
     for each in state.stamped:
         sender = list_names(each.nodes) or "somebody"
@@ -118,14 +118,14 @@ def data_beyond_tf(state: TreeState) -> Iterator[Finding]:
 
 
 def late_stamps(state: TreeState) -> Iterator[Finding]:
-    """An edge's stamps are old when they come: lookups of new data extrapolate into the future."""
+    """Stamps of an edge are old on arrival, so lookups for new data extrapolate to the future."""
     waiting = keeps_data_waiting(state)
 
     def late_s(edge: EdgeState) -> float:
         under_way_s = -state.skews_s.get(edge.stream.gid or b"", 0.0)
         return least_delay_s(edge) - (
             under_way_s if under_way_s >= SLOW_S else 0.0
-        )  # that part is a finding of its own
+        )  # another finding reports that part
 
     def is_late(edge: EdgeState) -> bool:
         return LATE_S <= late_s(edge) <= KEPT_S and (edge.parent, edge.child) not in waiting
@@ -147,9 +147,9 @@ def late_stamps(state: TreeState) -> Iterator[Finding]:
 
 
 def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, float, EdgeState]]:
-    """Return the moving edge above the data that lags most: none or one.
+    """Return the moving edge above the data whose stamps lag most: none or one.
 
-    With its lag behind the data and the age of the data, in seconds.
+    It comes with its lag behind the data and the age of the data, in seconds.
     """
     if len(each.delays_s) < FEWEST:
         return []
@@ -159,25 +159,25 @@ def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, floa
 
 
 def keeps_data_waiting(state: TreeState) -> set[tuple[str, str]]:
-    """Return the edges (parent, child) whose stamps lag behind data that need them.
+    """Return the edges (parent, child) whose stamps lag behind data that require them.
 
-    They are reported with the data.
+    These edges are reported together with the data.
     """
-    found = [way for each in state.stamped for way in _latest_above(state, each)]
-    return {(edge.parent, edge.child) for lack_s, _, edge in found if lack_s > LACK_S}
+    delays = [way for each in state.stamped for way in _latest_above(state, each)]
+    return {(edge.parent, edge.child) for lack_s, _, edge in delays if lack_s > LACK_S}
 
 
 def _off_clock(
     state: TreeState, each: StampedData, edge: EdgeState, age_s: float, *, simulated: bool
 ) -> str:
-    """Return how the data's clock differs from an edge's; empty if they are only late or ahead."""
+    """Return how the data's clock differs from an edge's clock; "" if only late or ahead."""
     if each.stamp_ns is None or KEPT_S < abs(age_s) < HOUR_S:
         return ""
     apart_ns = (
         each.stamp_ns - edge.stream.stamp_ns - (each.received_ns - edge.stream.arrivals.last_ns)
     )
     if abs(apart_ns) <= KEPT_NS:
-        return ""  # a recording that is played without its clock, perhaps
+        return ""  # possibly a recording played without its clock
     if each.stamp_ns == 0:
         return "has no stamp"
     fault = other_clock(each.stamp_ns, each.received_ns, state.clock_ns, simulated=simulated)
@@ -213,11 +213,11 @@ def _delay_s(edge: EdgeState) -> float:
 
 
 def _moving_above(state: TreeState, frame: str) -> list[EdgeState]:
-    """Return the moving edges from a frame to its root, the newest of each frame."""
+    """Return the moving edges between a frame and its root, the newest edge of each frame."""
     newest: dict[str, EdgeState] = {}
     for edge in state.taken:
-        known = newest.get(edge.child)
-        if known is None or known.age_s > edge.age_s:
+        stamp = newest.get(edge.child)
+        if stamp is None or stamp.age_s > edge.age_s:
             newest[edge.child] = edge
     parents = {child: edge.parent for child, edge in newest.items()}
     way = [newest[child] for child in way_up(frame, parents.get) if child in newest]

@@ -1,4 +1,4 @@
-"""Diagnosis of a tree: small functions from its state to findings, in order."""
+"""Diagnosis of a tree: functions from its state to findings, in order."""
 
 from __future__ import annotations
 
@@ -28,25 +28,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """Findings of the doctor, and what it observed."""
+    """Findings of the doctor, and a summary of its observation."""
 
     findings: list[Finding]
     #: Number of observed edges.
     edges: int
     #: Number of publishing nodes.
     nodes: int
-    #: Duration of the observation.
+    #: Duration of the observation in seconds.
     seconds: float
     #: Root frames of the trees.
     roots: tuple[str, ...] = ()
-    #: Topics with TF that were not observed.
+    #: Topics with TF that the doctor did not observe.
     elsewhere: tuple[str, ...] = ()
-    #: One sentence about the traffic of each topic.
+    #: A sentence about the traffic on each topic.
     costs: tuple[str, ...] = ()
 
 
-#: In the order in which one looks: is there anything, who sends it, what is its shape, and its
-#: time.
+#: The checks in order: is there TF, who sends it, what is its shape, and are its times correct.
 DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
     setup.settings_contradict,
     setup.no_tf,
@@ -96,19 +95,19 @@ def diagnose(state: TreeState) -> list[Finding]:
 
 
 def examine(states: Sequence[TreeState]) -> Diagnosis:
-    """Judge all states of one observation, of one or more pairs of topics."""
+    """Judge all states of an observation, one for each pair of topics."""
     findings = list(dict.fromkeys(finding for state in states for finding in diagnose(state)))
     edges = {(edge.parent, edge.child) for state in states for edge in state.taken}
     names = {name for state in states for edge in state.taken for name in edge.nodes}
     roots = tuple(dict.fromkeys(root for state in states for root in tree.trees_of(state)))
-    own = {topic for state in states for topic in state.topics}
+    topics = {topic for state in states for topic in state.topics}
     with_tf = [
         topic.name
         for state in states[:1]
         for topic in state.topics_of_type(TF_MESSAGE)
         if topic.publishers
     ]
-    elsewhere = tuple(name for name in with_tf if name not in own and "/_" not in name)
+    elsewhere = tuple(name for name in with_tf if name not in topics and "/_" not in name)
     seconds = states[0].seconds if states else 0.0
     return Diagnosis(
         sorted(findings, key=lambda finding: finding.severity),
@@ -121,14 +120,14 @@ def examine(states: Sequence[TreeState]) -> Diagnosis:
     )
 
 
-#: From this many edges on, a node that sends each in its own message could send fewer messages.
+#: A node that sends this many edges or more in separate messages could send fewer messages.
 _SINGLE_FROM = 3
 
 
 def cost(state: TreeState) -> str:
-    """Return the traffic on the topic of moving edges; empty without messages.
+    """Return a sentence about traffic on the topic of moving edges; empty without messages.
 
-    Each message goes to each listener, so a node should send its edges in one message.
+    Each message goes to each listener, so a node should send its edges in a single message.
     """
     messages = sum(count.messages for count in state.sent.values())
     if not messages or not state.seconds:

@@ -1,8 +1,8 @@
-"""Sensor drivers against their presets: frames, poses and switches that differ.
+"""Sensor drivers compared with their presets: frames, poses and switches that differ.
 
-A driver sends its device's calibration, a few millimetres from nominal. A pose far from nominal
-belongs to another device than the preset's. No device changes a pose that a preset calls exact,
-such as the rotation of an optical frame.
+A driver may send its device's calibration, which is a few millimetres from nominal. A pose far
+from nominal belongs to a different device than the preset's. Some poses in presets are exact, such
+as the rotation of an optical frame. No device has a different pose there.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 
     Value = bool | int | float | str
 
-#: Tolerances of a frame's pose: of a nominal value, and of an exact one.
+#: Tolerances of a nominal pose and of an exact pose.
 NOMINAL, EXACT = Offset(0.02, radians(5.0)), Offset(0.001, radians(0.2))
-#: A quaternion's length may be so far from 1.
+#: Tolerance for the length of a quaternion, which should be 1.
 UNIT_WITHIN = 0.005
-#: Maximum number of frames kept from publishers without a name.
+#: Maximum number of frames to keep from publishers without a name.
 _MOST = 1000
 
 
 def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
-    """Return the sensors that each node drives, by its full name."""
+    """Return the sensors that each node drives, by the node's full name."""
     return {
         node: process.drives
         for process in plan.processes
@@ -48,9 +48,9 @@ def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
 
 
 def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
-    """Return whether the plan itself, not a preset, gives the pose of this process's frame.
+    """Return whether the plan itself, not a preset, states the pose of this process's frame.
 
-    The pose of another owner's frame is the identity if the robot file has none.
+    If another owner's frame has no pose in the robot file, its pose in the plan is the identity.
     """
     if edge.kind != "static" or any(driven.publishes for driven in owner.drives):
         return False
@@ -58,12 +58,12 @@ def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
 
 
 def fixed_driver_edges(plan: Plan) -> dict[str, PlanEdge]:
-    """Return the fixed edges with a pose whose owner is not ``static``, by child."""
-    known, owners = expected_frames(plan), {process.name: process for process in plan.processes}
+    """Return the fixed edges with a pose and an owner other than ``static``, by child."""
+    frames, owners = expected_frames(plan), {process.name: process for process in plan.processes}
     return {
         edge.child: edge
         for edge in plan.edges
-        if edge.child not in known
+        if edge.child not in frames
         and edge.owner in owners
         and owners[edge.owner].kind != "static"
         and is_fixed(edge, owners[edge.owner])
@@ -72,7 +72,7 @@ def fixed_driver_edges(plan: Plan) -> dict[str, PlanEdge]:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """A frame that a driver publishes, and whether its pose is only nominal."""
+    """A frame that a driver publishes. ``nominal``: its pose is only nominal."""
 
     edge: PlanEdge
     driven: Driven
@@ -100,9 +100,9 @@ def is_pose(sent: Pose) -> bool:
 
 
 def is_off(expected: Expected, sent: Pose) -> bool:
-    """Return whether a pose is farther from the preset's than a calibration explains.
+    """Return whether a pose is farther from the preset's pose than a calibration explains.
 
-    False for what tf2 drops.
+    False for a pose that tf2 drops.
     """
     return is_pose(sent) and offset_of(expected.edge.pose, sent).beyond(
         NOMINAL if expected.nominal else EXACT
@@ -112,10 +112,10 @@ def is_off(expected: Expected, sent: Pose) -> bool:
 def driver_pose_differs(
     node: str, off: Sequence[tuple[Expected, Pose]], span: Span | None = None
 ) -> Finding:
-    """Return the finding for a sensor's frames that its driver sends with other poses."""
-    (expected, sent), *others = off
+    """Return the finding for frames of a sensor that its driver sends with other poses."""
+    (expected, sent), *further = off
     driven, edge = expected.driven, expected.edge
-    more = f", and {plural(len(others), 'more frame')} elsewhere" if others else ""
+    more = f", and {plural(len(further), 'more frame')} elsewhere" if further else ""
     sender = f"the driver {node}" if node else f"the driver of {driven.sensor}"
     message = (
         f"the pose of {edge.child} in {edge.parent} from {sender} is"
@@ -124,10 +124,12 @@ def driver_pose_differs(
     )
     notes = [
         Note(f"{reading.edge.child} in {reading.edge.parent}: {compare(reading.edge.pose, pose)}")
-        for reading, pose in others
+        for reading, pose in further
     ]
-    own = f"{{{edge.child}: {{xyz: [{_row(sent.xyz)}], quat_xyzw: [{_row(sent.quat_xyzw)}]}}}}"
-    values = f"sensors: {{{driven.sensor}: {{frames: {own}}}}}"
+    override = (
+        f"{{{edge.child}: {{xyz: [{_row(sent.xyz)}], quat_xyzw: [{_row(sent.quat_xyzw)}]}}}}"
+    )
+    values = f"sensors: {{{driven.sensor}: {{frames: {override}}}}}"
     advice = (
         f"is {driven.sensor} another model? If these are this unit's values, write them: {values}"
     )
@@ -140,7 +142,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SentPose:
-    """Transforms of a frame from a driver or owner, compared with the plan."""
+    """A pose of a frame that a driver or owner sent, with the expected pose."""
 
     expected: Expected | PlanEdge
     pose: Pose
@@ -158,9 +160,9 @@ def _edge_of(expected: Expected | PlanEdge) -> PlanEdge:
 
 
 class SentPoses:
-    """Poses of frames that drivers and other owners publish, message by message.
+    """Poses of frames that drivers and other owners publish, recorded from messages.
 
-    Each publisher is compared once per frame, if the rmw identifies the sender of a message.
+    If the rmw identifies the sender of a message, each publisher is compared once for each frame.
     """
 
     def __init__(self, plan: Plan, publishers: Publishers) -> None:
@@ -173,7 +175,7 @@ class SentPoses:
         self._waiting: list[SentPose] = []
 
     def follow(self, plan: Plan) -> None:
-        """Compare with another plan's poses; for changed ones, use messages from now on."""
+        """Compare with another plan's poses. For changed poses, use only messages from now on."""
         before = self._expected
         self._expected = {**fixed_driver_edges(plan), **expected_frames(plan)}
         self._received = {
@@ -204,7 +206,7 @@ class SentPoses:
         return frozenset(self._expected)
 
     def judge(self) -> Iterator[Finding]:
-        """Yield poses that differ from presets or plan, once per publisher and sensor."""
+        """Yield findings about deviating poses, once for each publisher and sensor."""
         wrong: dict[tuple[str, str], list[tuple[Expected, Pose]]] = {}
         elsewhere: dict[str, list[tuple[PlanEdge, str, Pose]]] = {}
         waiting = []
@@ -233,29 +235,29 @@ class SentPoses:
 
 def not_taken(
     node: str,
-    wanted: dict[str, Value],
-    found: dict[str, Value | None],
+    switches: dict[str, Value],
+    values: dict[str, Value | None],
     drives: tuple[Driven, ...] = (),
 ) -> list[Finding]:
     """Return a finding for each parameter of the node that differs from the plan.
 
-    ``found`` has the node's values; None: it does not declare the parameter.
+    ``values`` holds the node's values, None for a parameter that the node does not declare.
     """
     return [
-        _not_taken(node, name, value, found[name], drives)
-        for name, value in wanted.items()
-        if found[name] is None
-        or found[name] != value
-        or isinstance(found[name], bool) != isinstance(value, bool)
+        _not_taken(node, name, value, values[name], drives)
+        for name, value in switches.items()
+        if values[name] is None
+        or values[name] != value
+        or isinstance(values[name], bool) != isinstance(value, bool)
     ]
 
 
 def _not_taken(
-    node: str, name: str, wanted: Value, found: Value | None, drives: tuple[Driven, ...]
+    node: str, name: str, switch: Value, value: Value | None, drives: tuple[Driven, ...]
 ) -> Finding:
-    plan = f"the plan wrote {name}: {json.dumps(wanted)}"
+    plan = f"the plan wrote {name}: {json.dumps(switch)}"
     of = "".join(f" for {drive.sensor} ({drive.preset})" for drive in drives[:1])
-    if found is None:
+    if value is None:
         advice = (
             "is it a version of the node that has another switch, or another node of that name?"
         )
@@ -263,9 +265,9 @@ def _not_taken(
             "TF829", f"{node} has no parameter {name}, and {plan}{of}", None, help=advice
         )
     advice = (
-        f"start it with {name}: {json.dumps(wanted)}; otherwise it publishes what the plan does"
+        f"start it with {name}: {json.dumps(switch)}; otherwise it publishes what the plan does"
         " not expect"
     )
     return finding(
-        "TF829", f"{node} has {name}: {json.dumps(found)}, and {plan}{of}", None, help=advice
+        "TF829", f"{node} has {name}: {json.dumps(value)}, and {plan}{of}", None, help=advice
     )

@@ -1,8 +1,9 @@
-"""Faults of publishers against a plan, and their findings.
+"""Faults of publishers against a plan, and the findings about them.
 
-A ``Fault`` is an edge from a publisher that must not send it, or not in this way. The guard finds
-faults message by message, verify and the doctor at the end. ``fault_finding`` is the finding for
-faults of one code and one publisher's name; ``_SENTENCES`` has a function for each code.
+A ``Fault`` is an edge from a publisher that must not send it, or must not send it in this way. The
+guard detects faults in each message; verify and the doctor detect them at the end.
+``fault_finding`` returns the finding for faults with the same code and publisher name.
+``_SENTENCES`` has a function for each code.
 """
 
 from __future__ import annotations
@@ -28,48 +29,47 @@ if TYPE_CHECKING:
 
 NOT_OWNER, WRONG_PARENT, UNDECLARED, WRONG_TOPIC = "TF801", "TF802", "TF803", "TF809"
 LOOP, SELF, TWO_PUBLISHERS = "TF820", "TF821", "TF822"
-#: Codes about stamps: over as soon as these are right.
+#: Codes about stamps. Such a fault ends with the first correct stamp.
 _OF_STAMPS = frozenset({stamps.REPEATED, stamps.BACK, stamps.WRONG_CLOCK})
 _WARNINGS = frozenset({SELF, TWO_PUBLISHERS, stamps.REPEATED, stamps.BACK})
-#: A driver that sends frames otherwise than its preset has them.
+#: Codes of frames that a driver sends differently from its preset.
 _OTHERWISE = frozenset({WRONG_PARENT, UNDECLARED})
 LISTED_AT_MOST = 12
-#: Up to this many recovered edges get a line each; more share one line.
+#: Up to this many recovered edges get a line each. More edges share a line.
 OVER_IN_LINES = 3
-#: The most publishers of one name that have a note each.
+#: Maximum number of publishers with the same name that get a note each.
 RUNS_AT_MOST = 50
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """An edge from a publisher that must not send it, or not in this way."""
+    """An edge from a publisher that must not send it, or must not send it in this way."""
 
     #: The finding's code.
     code: str
-    #: The frame in which the pose was given, and the frame whose pose it was.
+    #: The parent and child frame of the received transform.
     parent: str
     child: str
-    #: The publisher's node; several candidates if the rmw does not identify senders; empty if it
-    #: has no name.
+    #: The publisher's node; several candidates if the rmw does not identify senders; empty without
+    #: a name.
     nodes: tuple[str, ...]
-    #: True: it came on /tf_static.
+    #: Whether it arrived on /tf_static.
     static: bool
-    #: The planned edge of that child; None: undeclared.
+    #: The planned edge of the child, None if the child is undeclared.
     edge: PlanEdge | None
-    #: True: the publisher has the owner's name and is not the owner.
+    #: Whether the publisher has the owner's name but is not the owner.
     namesake: bool = False
-    #: True: it is one of several alternating publishers with the owner's name, any of which may be
-    #: the owner.
+    #: Whether several publishers with the owner's name alternate, and each may be the owner.
     alternates: bool = False
-    #: The frames of a loop that the edge closes.
+    #: Frames of the loop that the edge closes.
     loop: tuple[str, ...] = ()
     #: The observed stamps, or the name of the other publisher.
     detail: str = ""
-    #: True: it is from a recording, in which publishers have no names.
+    #: Whether it comes from a recording, in which publishers have no names.
     recorded: bool = False
-    #: True: the publisher belongs to no process that the plan starts, despite its name.
+    #: Whether the publisher, despite its name, belongs to no process that the plan starts.
     stranger: bool = False
-    #: Number of processes that do it.
+    #: Number of processes with this fault.
     publishers: int = 1
 
     @property
@@ -83,7 +83,10 @@ class Fault:
 
     @property
     def whom(self) -> str:
-        """The publisher, as the object of advice; one without a name was named just before."""
+        """The publisher as the object of advice.
+
+        A pronoun stands for a publisher without a name.
+        """
         if self.publishers > 1:
             return "all but one of them" if self.alternates else "them"
         is_nameless = not self.nodes and not self.recorded and not self.namesake
@@ -103,20 +106,20 @@ class Fault:
 
     @property
     def is_owners(self) -> bool:
-        """Whether the edge's owner caused it."""
+        """Whether the edge's owner caused the fault."""
         return self.edge is not None and self.edge.node in self.nodes and not self.namesake
 
     @property
     def is_of_stamps(self) -> bool:
-        """Whether it concerns stamps, and ends with the first correct one."""
+        """Whether the fault is about stamps, and ends with the first correct stamp."""
         return self.code in _OF_STAMPS
 
 
 def over_texts(ended: Sequence[tuple[Fault, bool]], robot: str = "") -> list[str]:
-    """Return sentences that say faults of one group are over.
+    """Return sentences that report the end of faults of a group.
 
-    Each fault comes with a flag: True if listeners keep the latched edge. ``robot`` is the other
-    robot that caused all of them.
+    Each fault comes with a flag, which is True if listeners keep the latched edge. ``robot`` is
+    the other robot that caused all these faults, if there is one.
     """
     by_edge = {fault.ends: fault for fault, _ in ended}
     kept = {fault.ends for fault, is_kept in ended if is_kept}
@@ -137,30 +140,30 @@ def _over_text(fault: Fault, more: int = 0, *, kept: bool = False, who: str = ""
 
 @dataclass(frozen=True, slots=True)
 class FaultGroup:
-    """Faults in one finding, one for each edge, and the state of their publishers."""
+    """Faults in a finding, one for each edge, and the state of their publishers."""
 
     faults: Sequence[Fault]
     plan: Plan
-    #: Where each publisher runs; empty: unknown.
+    #: Where each publisher runs; empty if unknown.
     runs: Sequence[str] = ()
     #: The sensor that the publisher drives.
     driven: Driven | None = None
-    #: The plan's process that the publisher is proven to belong to.
+    #: The process of the plan that the publisher is proven to belong to.
     process: str = ""
 
     @property
     def first(self) -> Fault:
-        """The fault that is named first."""
+        """The fault that the finding names first."""
         return self.faults[0]
 
     @property
     def edges(self) -> str:
-        """The first edge's name, and how many more there are."""
+        """The first edge's name, and the number of further edges."""
         return self.first.name + self.more
 
     @property
     def more(self) -> str:
-        """How many edges there are besides the first one."""
+        """The number of further edges, as text."""
         more = len(self.faults) - 1
         return f" and {plural(more, 'more edge')}" if more else ""
 
@@ -177,10 +180,10 @@ def group_of(
     driven: Driven | None = None,
     process: str = "",
 ) -> FaultGroup:
-    """Return faults of one code and one publisher's name as a group, with one for each edge."""
+    """Return faults with the same code and publisher name as a group, with one for each edge."""
     by_edge = {fault.ends: fault for fault in faults}
-    # Each of two publishers of an edge is named with the other; of those that alternate, one may
-    # be the owner.
+    # Two publishers of an edge are named together. Of alternating publishers, one may be the
+    # owner.
     is_pair = faults[0].code == TWO_PUBLISHERS
     number = 1 if is_pair else max(1, len(runs) - faults[0].alternates)
     faults = [replace(fault, publishers=number) for fault in by_edge.values()]
@@ -200,7 +203,7 @@ def fault_finding(group: FaultGroup, span: Span | None = None) -> Finding:
     return finding(first.code, message, span, help=advice, notes=notes, severity=severity)
 
 
-# The message and the help of each code.
+# Message and help of each code.
 
 
 def _not_owner(group: FaultGroup) -> tuple[str, str]:
@@ -292,7 +295,7 @@ _SENTENCES: Mapping[str, Callable[[FaultGroup], tuple[str, str]]] = {
 
 
 def taken_finding(group: FaultGroup) -> Finding:
-    """Return the finding for edges that were published before the start."""
+    """Return the finding for edges that another node published before the start."""
     first = group.first
     message = f"{group.edges} {group.are} already published by {first.who}"
     if first.edge and not first.edge.may_hang_on(first.parent):
@@ -311,7 +314,7 @@ def taken_finding(group: FaultGroup) -> Finding:
 
 
 def other_robot_finding(faults: Sequence[Fault], run: OtherRun, plan: Plan) -> Finding:
-    """Return the finding for all edges that another robot publishes here."""
+    """Return the finding for all edges that another robot publishes on these topics."""
     is_mild = all(
         fault.edge is None and fault.code in {UNDECLARED, TWO_PUBLISHERS} for fault in faults
     )
@@ -337,7 +340,7 @@ def other_robot_finding(faults: Sequence[Fault], run: OtherRun, plan: Plan) -> F
 
 
 def _leave_out_help(group: FaultGroup) -> str:
-    """Return the help for a publisher that should not send the edge, or has a wrong parent."""
+    """Return the help for a publisher that should not send the edge or has a wrong parent."""
     first, plan = group.first, group.plan
     if first.namesake:
         return f"stop {first.whom}: is the robot running twice? {tree.LAST_WINS}"
@@ -358,7 +361,7 @@ def _leave_out_help(group: FaultGroup) -> str:
 
 
 def _run_by(fault: Fault, plan: Plan) -> str:
-    """Return the robot's own process that the publisher certainly belongs to."""
+    """Return the process of this robot that the publisher certainly belongs to."""
     kinds = {"external"} if fault.stranger else {"run", "external", "component"}
     for process in plan.processes if len(fault.nodes) == 1 else ():
         if process.kind in kinds and fault.nodes[0] in process.nodes:
@@ -367,7 +370,7 @@ def _run_by(fault: Fault, plan: Plan) -> str:
 
 
 def _misnamed_help(group: FaultGroup) -> str:
-    """Return the help if the owner sends the edges with another node name."""
+    """Return the help for the case that the owner's node has another name than planned."""
     first = group.first
     if first.code != NOT_OWNER or first.namesake or len(first.nodes) != 1 or first.edge is None:
         return ""
@@ -381,7 +384,10 @@ def _misnamed_help(group: FaultGroup) -> str:
 
 
 def sensor_of(fault: Fault, drives: Mapping[str, Sequence[Driven]]) -> Driven | None:
-    """Return the sensor that the publisher drives; of several, the one named in the frame."""
+    """Return the sensor that the publisher drives.
+
+    If it drives several sensors, return the sensor whose name is in the frame's name.
+    """
     driven = drives.get(fault.nodes[0], ()) if len(fault.nodes) == 1 and not fault.namesake else ()
     named = [sensor for sensor in driven if sensor.sensor in fault.child]
     return next(iter(named or driven), None)
@@ -408,7 +414,7 @@ def _driver_message(group: FaultGroup) -> str:
 
 
 def _driver_help(group: FaultGroup) -> str:
-    """Return the help about a sensor's driver; empty if there is none."""
+    """Return the help about a sensor's driver; empty without a driver."""
     first, driven = group.first, group.driven
     if driven is None or first.code not in {*_OTHERWISE, NOT_OWNER}:
         return ""
@@ -437,7 +443,7 @@ def _switch_help(group: FaultGroup) -> str:
 
 
 def _child_pattern(group: FaultGroup) -> str:
-    """Return the child, or a pattern if the names differ only in numbers: ``tag_*``."""
+    """Return the child, or a pattern such as ``tag_*`` if the names differ only in numbers."""
     children = [fault.child for fault in group.faults]
     stems = {child.rstrip("0123456789") for child in children}
     if len(children) > 1 and len(stems) == 1 and "" not in stems:
@@ -462,7 +468,7 @@ def _declared_notes(fault: Fault) -> list[Note]:
 
 
 def _run_notes(group: FaultGroup) -> list[Note]:
-    """Return a note for each publisher, saying where it runs."""
+    """Return a note for each publisher with the place where it runs."""
     first = group.first
     who = replace(first, publishers=1, namesake=first.namesake and not first.alternates).who
     runs = [] if len(first.nodes) > 1 else filter(None, group.runs)

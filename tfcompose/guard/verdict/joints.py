@@ -1,7 +1,7 @@
 """Joint states: their subscribers, publishers and joints.
 
-A moving joint needs states from exactly one publisher. A listener takes every message, so with two
-publishers the frames jump between their positions.
+A moving joint needs states from exactly one publisher. A listener uses every message, so with two
+publishers the frames jump between two positions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NAMED_AT_MOST = 8
 
 
 def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
-    """Joint states arrive, and no node turns them into transforms."""
+    """Joint states arrive, but no node turns them into transforms."""
     missing = _missing(state)
     for topic in _joint_topics(state):
         if (
@@ -52,7 +52,7 @@ def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
 
 
 def no_joint_states(state: TreeState) -> Iterator[Finding]:
-    """A robot state publisher waits for joint states that no node publishes."""
+    """A robot_state_publisher waits for joint states that no node publishes."""
     missing = _missing(state)
     for topic in _joint_topics(state):
         nodes = _transformers(state, topic)
@@ -67,7 +67,7 @@ def no_joint_states(state: TreeState) -> Iterator[Finding]:
 
 
 def _sender_help(state: TreeState) -> str:
-    """Return the expected publisher of joint states: the simulating process, or ROS's nodes."""
+    """Return the expected publisher of joint states: the simulating process, or nodes of ROS."""
     simulating = [
         process
         for process in (state.plan.processes if state.plan else ())
@@ -84,7 +84,7 @@ def _sender_help(state: TreeState) -> str:
 
 
 def joint_without_state(state: TreeState) -> Iterator[Finding]:
-    """Joint states arrive without a joint of the description."""
+    """Joint states lack a joint of the robot description."""
     sent = state.joint_names
     if not sent:
         return
@@ -106,14 +106,14 @@ def joint_without_state(state: TreeState) -> Iterator[Finding]:
 
 
 def _missing(state: TreeState) -> list[MovingJoint]:
-    """Return the moving joints whose frames are not published; a frame_prefix may precede them."""
+    """Return the moving joints whose frames no node publishes, with or without frame_prefix."""
     children = {edge.child for edge in state.taken}
     plain = children | {child.rpartition("/")[2] for child in children}
     return [joint for joint in _moving_joints(state) if joint.child not in plain]
 
 
 def _moving_joints(state: TreeState) -> Sequence[MovingJoint]:
-    """Return the moving joints of the robot's description, or of the plan if there is none."""
+    """Return the moving joints of the robot description; without one, of the plan."""
     if state.moving_joints or state.plan is None:
         return state.moving_joints
     return [
@@ -124,16 +124,16 @@ def _moving_joints(state: TreeState) -> Sequence[MovingJoint]:
 
 
 def _joint_topics(state: TreeState) -> list[TopicState]:
-    """Return the topics named ``joint_states``, without those of other robots.
+    """Return the topics named ``joint_states``, without topics of other robots.
 
-    Another robot has its own TF topics, in a namespace below this robot's.
+    Another robot has its own TF topics in a namespace below this robot's namespace.
     """
-    own = _namespace(state.topics[0])
+    namespace = _namespace(state.topics[0])
     spaces = {
         _namespace(topic.name) for topic in state.topics_of_type(TF_MESSAGE) if topic.publishers
     }
     neighbours = tuple(
-        f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/")
+        f"{space}/" for space in spaces if space != namespace and space.startswith(f"{namespace}/")
     )
     named = [
         topic
@@ -143,7 +143,7 @@ def _joint_topics(state: TreeState) -> list[TopicState]:
     return [
         topic
         for topic in named
-        if topic.name.startswith(f"{own}/") and not topic.name.startswith(neighbours)
+        if topic.name.startswith(f"{namespace}/") and not topic.name.startswith(neighbours)
     ]
 
 
@@ -160,7 +160,7 @@ def _transformers(state: TreeState, topic: TopicState) -> list[str]:
 
 
 def joint_senders(state: TreeState) -> Iterator[Finding]:
-    """Two publishers send states of a joint, or the robot has no such joint."""
+    """Two publishers send states of the same joint, or the robot does not have the joint."""
     heard = {topic.name for topic in _joint_topics(state)}
     senders = [sender for sender in state.sent_joints if sender.topic in heard]
     yield from find_sent_twice(senders)
@@ -179,7 +179,7 @@ def planned_joints(plan: Plan) -> frozenset[str]:
 
 
 def find_sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
-    """Find joints whose states several publishers of a topic send at the same time."""
+    """Yield findings about joints whose states several publishers send at the same time."""
     shared: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for topic in dict.fromkeys(sender.topic for sender in senders):
         of_topic = [sender for sender in senders if sender.topic == topic and sender.node]
@@ -201,26 +201,26 @@ def find_sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
 
 
 def _together(senders: Sequence[SentJoints]) -> list[SentJoints]:
-    """Return the publishers that sent at the same time as another one."""
+    """Return the publishers that sent at the same time as another publisher."""
     return [
         sender
         for sender in senders
         if any(
-            other is not sender
-            and sender.last_ns >= other.first_ns + TOGETHER_S * 1e9
-            and other.last_ns >= sender.first_ns + TOGETHER_S * 1e9
-            for other in senders
+            peer is not sender
+            and sender.last_ns >= peer.first_ns + TOGETHER_S * 1e9
+            and peer.last_ns >= sender.first_ns + TOGETHER_S * 1e9
+            for peer in senders
         )
     ]
 
 
-def unknown_joints(senders: Sequence[SentJoints], known: Collection[str]) -> Iterator[Finding]:
-    """Find joints that the robot does not have; none if its joints are unknown."""
-    for sender in senders if known else ():
-        unknown = sorted(sender.joints.difference(known))
+def unknown_joints(senders: Sequence[SentJoints], names: Collection[str]) -> Iterator[Finding]:
+    """Yield findings about joints that the robot does not have, if its joints are known."""
+    for sender in senders if names else ():
+        unknown = sorted(sender.joints.difference(names))
         if not unknown or not sender.node:
             continue
-        nearest_names = {joint: nearest(joint, list(known)) for joint in unknown}
+        nearest_names = {joint: nearest(joint, list(names)) for joint in unknown}
         near = [
             f"did you mean {name} for {joint}?" for joint, name in nearest_names.items() if name
         ]

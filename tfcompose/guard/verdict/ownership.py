@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: bool) -> str:
-    """Return the code for a planned edge received with ``parent``; empty: no fault.
+    """Return the code of the fault of a planned edge received with ``parent``; "" without one.
 
-    ``static``: it came on /tf_static. ``owner``: its owner may have sent it. ``sure``: no other
-    node can have.
+    ``static``: it arrived on /tf_static. ``owner``: the owner may have sent it. ``sure``: no other
+    node can have sent it.
     """
     if not edge.may_hang_on(parent):
         return "TF802"
@@ -24,7 +24,7 @@ def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: boo
 
 
 def relays_of(plan: Plan) -> frozenset[str]:
-    """Return the nodes that may forward edges of others: the strict guards of all hosts."""
+    """Return the nodes that may forward edges of other processes: strict guards of all hosts."""
     hosts = {None, *(process.host for process in plan.processes)}
     return frozenset(node for host in hosts for node in plan.guards_of(host))
 
@@ -32,5 +32,5 @@ def relays_of(plan: Plan) -> frozenset[str]:
 def may_be_owners(
     edge: PlanEdge, nodes: Sequence[str], relays: frozenset[str] = frozenset()
 ) -> bool:
-    """Return whether one of the nodes is the edge's owner, or forwards its messages."""
+    """Return whether one of the nodes is the edge's owner or forwards the owner's messages."""
     return edge.node in nodes or not relays.isdisjoint(nodes)

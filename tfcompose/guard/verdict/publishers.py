@@ -22,14 +22,15 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.edges import EdgeState
     from tfcompose.tf.live.state import TreeState
 
-#: A listener keeps the last 100 messages on /tf_static, one of each publisher.
+#: A listener keeps the last 100 messages on /tf_static. With more publishers, messages are lost.
 MOST_STATIC = 100
 LISTED_AT_MOST = 12
-#: Two poses closer than this count as the same.
+#: Two poses within this distance count as equal.
 SAME_POSE = Offset(1e-3, math.radians(0.1))
-#: A micrometre, a millidegree.
+#: One micrometre and about one millidegree.
 _SAME = Offset(1e-6, 2e-5)
-#: If both publishers send for longer than this, the second has not simply replaced the first.
+#: If both publishers send for longer than this, in seconds, the second one is not just a
+#: replacement.
 TOGETHER_S = 0.3
 
 
@@ -37,7 +38,7 @@ TOGETHER_S = 0.3
 
 
 def two_publishers_message(edges: str, publishers: Sequence[str], *, are_many: bool) -> str:
-    """Return the message for edges with two publishers; a single name has two instances."""
+    """Return the message for edges with two publishers. A single name means two instances."""
     names = list(dict.fromkeys(publishers))
     by = f"twice by {names[0]}" if len(names) == 1 else f"by {' and by '.join(names)}"
     return f"{edges} {'are' if are_many else 'is'} published {by}"
@@ -46,10 +47,10 @@ def two_publishers_message(edges: str, publishers: Sequence[str], *, are_many: b
 def topics_message(
     edges: str, topics: Sequence[tuple[str, str]], declared: str = "", *, are_many: bool = False
 ) -> str:
-    """Return the message for edges on the wrong topic, or on both.
+    """Return the message for edges on the wrong topic or on both topics.
 
-    ``topics`` has each topic with its publisher. ``declared`` is the plan's topic; empty: the plan
-    has none.
+    ``topics`` has each topic with its publisher. ``declared`` is the topic in the plan; empty
+    without a plan.
     """
     on = " and ".join(f"on {' by '.join(filter(None, pair))}" for pair in topics)
     return (
@@ -61,7 +62,7 @@ def topics_message(
 def flood(node: str, where: str, transforms: int, hertz: float | None) -> Finding:
     """Return the finding for a publisher of more undeclared edges than the guard judges.
 
-    Its messages have up to ``transforms`` transforms. ``hertz`` is their rate; None: unknown.
+    Its messages have up to ``transforms`` transforms. ``hertz`` is their rate, None if unknown.
     """
     rate = f" at {hertz:.3g} Hz" if hertz else ""
     message = (
@@ -103,7 +104,7 @@ def unfenced_finding(
 ) -> Finding:
     """Return the finding for a process of a strict plan that bypasses the filter.
 
-    ``profile`` is the profile file that it started with instead of the plan's; empty: none.
+    ``profile`` is the profile file with which it started instead of the plan's; empty without one.
     """
     message = (
         f"{node} of {process} publishes {topic} without passing the strict guard: every"
@@ -138,7 +139,8 @@ def unfenced_finding(
 def unmarked_finding(node: str, topic: str, where: str, *, remapped: bool) -> Finding:
     """Return the finding for a process of a strict plan's run whose environment was cleared.
 
-    It runs ``where``, and bypasses the filter. ``remapped``: remappings isolate the others.
+    ``where`` describes the process, which bypasses the filter. ``remapped``: remappings isolate
+    the other processes.
     """
     message = (
         f"{node} publishes {topic} without passing the strict guard: every listener receives it"
@@ -161,12 +163,12 @@ def best_effort_publisher(node: str, topic: str) -> Finding:
     return finding("TF826", message, None, help="publish it reliable")
 
 
-def leak(node: str, topic: str, own: str) -> Finding:
+def leak(node: str, topic: str, own_type: str) -> Finding:
     """Return the finding for a node of an isolated robot that publishes a global TF topic."""
-    message = f"{node} publishes the global {topic}, but its robot's TF is on {own}"
+    message = f"{node} publishes the global {topic}, but its robot's TF is on {own_type}"
     advice = (
-        f"start it with the remapping {topic}:={own}, as tfcompose does with the processes that it"
-        " starts"
+        f"start it with the remapping {topic}:={own_type}, as tfcompose does with the processes"
+        " that it starts"
     )
     return finding("TF827", message, None, help=advice)
 
@@ -214,19 +216,19 @@ def two_publishers(state: TreeState) -> Iterator[Finding]:
         ]
         distinct = {edge.stream.gid for edge in rivals}
         if len({edge.stream.static for edge in rivals}) > 1:
-            continue  # it comes on both topics, which is a finding of its own
+            continue  # it arrives on both topics, which another finding reports
         if len(distinct) > 1 and child not in planned and _together(rivals):
             groups.setdefault(tuple(sorted(distinct, key=str)), []).append(rivals)
-    for found in groups.values():
-        rivals = sorted(found[0], key=who)
+    for states in groups.values():
+        rivals = sorted(states[0], key=who)
         names = list(dict.fromkeys(who(edge) for edge in rivals))
-        named = with_more(rivals[0].name, len(found) - 1)
+        named = with_more(rivals[0].name, len(states) - 1)
         message = (
-            two_publishers_message(named, names, are_many=len(found) > 1)
+            two_publishers_message(named, names, are_many=len(states) > 1)
             + f"; {_difference(rivals)}"
         )
         notes = [Note(_where(state, edge)) for edge in rivals]
-        notes += [Note(others[0].name) for others in found[1:8]]
+        notes += [Note(edge_states[0].name) for edge_states in states[1:8]]
         advice = (
             "stop one of them, or disable its TF output"
             if len(names) > 1
@@ -241,10 +243,10 @@ def both_topics(state: TreeState) -> Iterator[Finding]:
     for edge in state.taken:
         kinds.setdefault(edge.child, {})[edge.stream.static] = edge
     planned = state.planned
-    for child, found in kinds.items():
-        if len(found) == 1 or child in planned:
+    for child, kinds_of_child in kinds.items():
+        if len(kinds_of_child) == 1 or child in planned:
             continue
-        moving, fixed = found[False], found[True]
+        moving, fixed = kinds_of_child[False], kinds_of_child[True]
         message = topics_message(
             child, [(state.topics[0], who(moving)), (state.topics[1], who(fixed))]
         )
@@ -253,7 +255,7 @@ def both_topics(state: TreeState) -> Iterator[Finding]:
 
 
 def volatile_static(state: TreeState) -> Iterator[Finding]:
-    """Fixed frames are published so that no listener can receive them."""
+    """Fixed frames are published with a QoS that no listener receives."""
     for publisher in state.publishers:
         if (
             publisher.static
@@ -270,7 +272,7 @@ def volatile_static(state: TreeState) -> Iterator[Finding]:
 
 
 def volatile_reader(state: TreeState) -> Iterator[Finding]:
-    """A node's subscription misses fixed frames that were sent before it joined."""
+    """A node's subscription misses fixed frames that were sent before it was created."""
     if state.volatile_readers and any(publisher.static for publisher in state.publishers):
         listen = "listens" if len(state.volatile_readers) == 1 else "listen"
         message = (
@@ -286,7 +288,7 @@ def volatile_reader(state: TreeState) -> Iterator[Finding]:
 
 
 def best_effort(state: TreeState) -> Iterator[Finding]:
-    """Frames are sent best effort, but listeners require reliable."""
+    """Frames are published best-effort, but listeners require reliable."""
     for publisher in state.publishers:
         if not publisher.reliable and publisher.node and publisher.type in {"", TF_MESSAGE}:
             yield best_effort_publisher(
@@ -295,7 +297,7 @@ def best_effort(state: TreeState) -> Iterator[Finding]:
 
 
 def other_type(state: TreeState) -> Iterator[Finding]:
-    """Messages of another type are published on a topic of TF."""
+    """A topic of TF has messages of another type."""
     for topic in state.graph:
         if topic.name in state.topics and topic.type != TF_MESSAGE and topic.publishers:
             message = (
@@ -312,7 +314,7 @@ def other_type(state: TreeState) -> Iterator[Finding]:
 
 
 def unreadable(state: TreeState) -> Iterator[Finding]:
-    """Messages arrive that cannot be decoded as TFMessage."""
+    """Messages arrive that cannot be decoded as a TFMessage."""
     named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.malformed.items():
         sender = named.get(gid) if gid is not None else None
@@ -333,7 +335,7 @@ def unreadable(state: TreeState) -> Iterator[Finding]:
 
 
 def many_static(state: TreeState) -> Iterator[Finding]:
-    """Too many nodes publish fixed frames: listeners lose some."""
+    """Too many nodes publish fixed frames, so listeners lose some."""
     fixed = [publisher for publisher in state.publishers if publisher.static]
     if len(fixed) >= MOST_STATIC:
         nodes = sorted({publisher.node for publisher in fixed if publisher.node})
@@ -348,9 +350,9 @@ def many_static(state: TreeState) -> Iterator[Finding]:
 
 
 def isolation_leak(state: TreeState) -> Iterator[Finding]:
-    """A node of a robot with separate TF topics publishes on the global ones."""
+    """A node of a robot with separate TF topics publishes on the global topics."""
     topics = {topic.name: topic for topic in state.topics_of_type(TF_MESSAGE)}
-    own = (
+    nodes = (
         {node for process in state.plan.processes for node in process.nodes}
         if state.plan
         else set()
@@ -363,12 +365,12 @@ def isolation_leak(state: TreeState) -> Iterator[Finding]:
         ):
             continue
         for node in topics[root].publishers if root in topics else ():
-            if node.startswith(f"{inside}/") or (node in own and state.topics != GLOBAL):
+            if node.startswith(f"{inside}/") or (node in nodes and state.topics != GLOBAL):
                 yield leak(node, root, name)
 
 
 def _together(edges: Sequence[EdgeState]) -> bool:
-    """Return whether two of them sent in overlapping periods; fixed edges stay valid."""
+    """Return whether two publishers sent in overlapping periods. Fixed edges stay valid."""
     spans = []
     for edge in edges:
         stream = edge.stream
@@ -378,7 +380,7 @@ def _together(edges: Sequence[EdgeState]) -> bool:
 
 
 def _difference(edges: Sequence[EdgeState]) -> str:
-    """Return the distance between the newest poses."""
+    """Return the distance between the newest poses, as text."""
     off = offset_of(edges[0].stream.pose, edges[1].stream.pose)
     return (
         f"their newest values are {off.text} apart"
@@ -394,7 +396,7 @@ def _where(state: TreeState, edge: EdgeState) -> str:
 
 
 def show_pose(pose: Pose) -> str:
-    """Return the pose in one line: metres, and fixed-axis angles in degrees."""
+    """Return the pose on a single line: metres, and fixed-axis angles in degrees."""
     xyz = " ".join(f"{round(value, 5) + 0.0:g}" for value in pose.xyz)
     angles = Pose(pose.xyz, normalise(pose.quat_xyzw)).rpy
     rpy = " ".join(f"{round(math.degrees(angle), 3) + 0.0:g}" for angle in angles)
@@ -402,21 +404,21 @@ def show_pose(pose: Pose) -> str:
 
 
 def compare(expected: Pose, observed: Pose) -> str:
-    """Return both poses for display."""
+    """Return both poses as text."""
     return f"seen {show_pose(observed)}; expected {show_pose(expected)}"
 
 
 def pose_differs(
     off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, span: Span | None = None
 ) -> Finding:
-    """Return the finding for edges whose pose differs from the plan's.
+    """Return the finding for edges whose pose differs from the plan.
 
-    ``off`` has each edge with the parent and the pose as sent. ``publisher`` is empty if unknown;
+    ``off`` has each edge with the sent parent and pose. ``publisher`` is empty if unknown.
     ``span`` is the first edge's place in the robot file.
     """
-    (edge, parent, pose), *others = off
+    (edge, parent, pose), *further = off
     by = f" from {publisher}" if publisher else ""
-    more = f", and of {plural(len(others), 'more frame')} too" if others else ""
+    more = f", and of {plural(len(further), 'more frame')} too" if further else ""
     message = (
         f"the pose of {edge.child} in {parent}{by} is off by"
         f" {offset_of(edge.pose, pose).text}{more}"
@@ -426,7 +428,7 @@ def pose_differs(
             f"{edge.child} in {above} by {offset_of(edge.pose, sent).text}:"
             f" {compare(edge.pose, sent)}"
         )
-        for edge, above, sent in others[:LISTED_AT_MOST]
+        for edge, above, sent in further[:LISTED_AT_MOST]
     ]
     notes += (
         [] if span else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]

@@ -1,4 +1,4 @@
-"""Findings about rates: edges that never came, stopped, are slow, or have gaps."""
+"""Findings about rates: edges that never arrived, stopped, are slow, or have gaps."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.edges import EdgeState
     from tfcompose.tf.live.state import TreeState
 
-#: Least rates in Hz of what navigation looks up for every scan and every control step (as for
+#: Minimum rates in Hz of edges that navigation looks up for each scan and each control step (as in
 #: TF307), by frame names.
 LEAST = {("odom", "base_link"): 20.0, ("odom", "base_footprint"): 20.0, ("map", "odom"): 5.0}
-#: Any edge that others hang on.
+#: Minimum rate in Hz of any other edge with edges below it.
 LEAST_INSIDE = 5.0
-#: A timer of 20 Hz sends a little less than 20 Hz.
+#: Fraction of the minimum rate to accept. A timer of 20 Hz sends a little less often than 20 Hz.
 NEARLY = 0.9
 #: Minimum number of messages to judge a rate.
 FEWEST = 3
-#: A gap counts if it exceeds the others by this factor, and this many seconds.
+#: A gap counts if it exceeds the other gaps by this factor, and exceeds this many seconds.
 GAP, GAP_S = 10.0, 1.0
-#: A low rate is certain after this time.
+#: A low rate is certain after this time, in seconds.
 SURE_S = 1.0
 NAMED_AT_MOST = 6
 
 
-# Edges of a plan; ``place`` is where the first one is in the robot's file.
+# Edges of a plan; ``span`` is the first edge's place in the robot file.
 
 
 def never_received_finding(
     edges: Sequence[PlanEdge], advice: str, span: Span | None = None
 ) -> Finding:
-    """Return the finding for edges of one owner that were not received."""
+    """Return the finding for edges of an owner that never arrived."""
     are_many = len(edges) > 1
     named = with_more(edges[0].name, len(edges) - 1)
     message = (
@@ -66,9 +66,9 @@ def silent(
     over: bool = False,
     gone: bool = False,
 ) -> Finding:
-    """Return the finding for edges of one owner that were not received for ``silence_s`` seconds.
+    """Return the finding for edges of an owner that did not arrive for ``silence_s`` seconds.
 
-    ``over``: they came again after that. ``gone``: the owner's publisher has left.
+    ``over``: the edges have arrived again since. ``gone``: the owner's publisher has left.
     """
     first = edges[0]
     names = [edge.name for edge in edges]
@@ -95,7 +95,7 @@ def slow(
     span: Span | None = None,
     severity: Severity = "warning",
 ) -> Finding:
-    """Return the finding for edges of one owner that arrive at ``rate`` hertz."""
+    """Return the finding for edges of an owner that arrive at ``rate`` Hz."""
     first = edges[0]
     come = "comes" if len(edges) == 1 else "come"
     named = list_names([edge.name for edge in edges])
@@ -158,11 +158,11 @@ def _declared_notes(edges: Sequence[PlanEdge]) -> list[Note]:
     return [*notes, Note(f"and {more} more")] if more else notes
 
 
-# Edges of which no plan says how often they come.
+# Edges without a rate in a plan.
 
 
 def low_rate(state: TreeState) -> Iterator[Finding]:
-    """An edge arrives so rarely that lookups fail between two messages, and frames jump."""
+    """An edge arrives so rarely that lookups between two messages fail and frames jump."""
     inside, rated = {edge.parent for edge in state.taken}, state.rated
     for edge in state.moving:
         rate, least = edge.timing.rate, least_of(edge, inside) * _speed(state, edge)
@@ -193,7 +193,7 @@ def low_rate(state: TreeState) -> Iterator[Finding]:
 
 
 def gap(state: TreeState) -> Iterator[Finding]:
-    """An edge with a high rate pauses."""
+    """An edge with a high rate has a pause."""
     rated = state.rated
     parents = Counter(child for _, child in {(edge.parent, edge.child) for edge in state.moving})
     for edge in state.moving:
@@ -212,7 +212,7 @@ def gap(state: TreeState) -> Iterator[Finding]:
 
 
 def fell_silent(state: TreeState) -> Iterator[Finding]:
-    """An edge arrived, and stopped."""
+    """An edge arrived, but has stopped."""
     alive = {(edge.parent, edge.child) for edge in state.moving if not is_silent(edge)}
     elsewhere = {edge.child for edge in state.moving if not is_silent(edge)}
     rated = state.rated
@@ -220,7 +220,7 @@ def fell_silent(state: TreeState) -> Iterator[Finding]:
         if not is_silent(edge) or edge.child in rated or (edge.parent, edge.child) in alive:
             continue
         if edge.child in elsewhere and edge.present is not False:
-            # The frame hangs on another parent now, which is a finding of its own, or right.
+            # The frame has another parent now, which is correct or another finding.
             continue
         yield _silence(who(edge), who(edge), [edge.name], edge.age_s, gone=edge.present is False)
 
@@ -239,14 +239,14 @@ def find_fixed_left(state: TreeState) -> Iterator[Finding]:
 
 
 def _speed(state: TreeState, edge: EdgeState) -> float:
-    """Return the real-time factor of a simulated edge, at most 1: expected rates shrink by it."""
+    """Return the real-time factor of a simulated edge, at most 1. It reduces expected rates."""
     clock_ns = state.clock_ns
     ruled = clock_ns is not None and abs(edge.stream.stamp_ns - clock_ns) <= KEPT_NS
     return min(1.0, edge.stream.speed) if ruled else 1.0
 
 
 def least_of(edge: EdgeState, inside: set[str]) -> float:
-    """Return the minimum rate of an edge in hertz; 0 if there is none."""
+    """Return the minimum rate of an edge in Hz, 0 without one."""
     stream = edge.stream
     named = LEAST.get((stream.parent.rpartition("/")[2], stream.child.rpartition("/")[2]))
     return named or (LEAST_INSIDE if stream.child in inside else 0.0)

@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.state import RosProcess, TreeState
 
 LOCALHOST_ONLY, SERVER = "ROS_LOCALHOST_ONLY", "ROS_DISCOVERY_SERVER"
-#: The variables that decide who hears whom.
+#: Variables that decide which nodes discover each other.
 VARIABLES = (DOMAIN, RANGE, LOCALHOST_ONLY, RMW, "ROS_STATIC_PEERS", SERVER)
-#: Variables that decide which nodes discover each other, with their default values.
+#: Default values of these variables; empty if the installation decides.
 DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: "", SERVER: ""}
-#: Maximum number of differing settings in a finding, and of processes for each.
+#: Maximum number of differing settings in a finding, and of processes with each setting.
 MOST_SETTINGS = MOST_PROCESSES = 3
 
 
 def settings_text(settings: Mapping[str, str]) -> str:
-    """Return the settings for display."""
+    """Return the settings as text."""
     settings_shown = [f"{name}={settings[name]}" for name in VARIABLES if settings.get(name)]
     if not settings.get(DOMAIN):
         settings_shown.insert(0, f"{DOMAIN} unset (0)")
@@ -33,7 +33,7 @@ def settings_text(settings: Mapping[str, str]) -> str:
 
 
 def elsewhere_help(elsewhere: Sequence[str]) -> str:
-    """Return the help for missing TF, depending on TF on other topics."""
+    """Return the help for missing TF, which depends on TF on other topics."""
     if elsewhere:
         return f"TF is on {list_names(elsewhere)}: {namespace_options(elsewhere)}"
     return "is the robot running, and with these settings? tfcompose doctor looks for the reason"
@@ -44,8 +44,8 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
     if state.publishers or state.edges or state.malformed:
         return
     moving, fixed = state.topics
-    others = plural(len(state.nodes), "other node") if state.nodes else "no other node"
-    message = f"no node publishes {moving} or {fixed}; in {state.seconds:.1f} s {others} "
+    other_nodes = plural(len(state.nodes), "other node") if state.nodes else "no other node"
+    message = f"no node publishes {moving} or {fixed}; in {state.seconds:.1f} s {other_nodes} "
     message += "was found" if len(state.nodes) < 2 else "were found"  # noqa: PLR2004 (one, or none)
     notes = [Note(f"seen: {list_names(state.nodes)}")] if state.nodes else []
     notes.append(Note(f"settings: {settings_text(state.settings)}"))
@@ -75,19 +75,19 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
 
 
 def other_settings(state: TreeState) -> Iterator[Finding]:
-    """Missing frames: local processes that cannot be heard because their ROS setup differs."""
+    """Frames are missing, and local processes with another ROS setup may publish them."""
     complete = not state.planned - {edge.child for edge in state.edges}
     if (state.edges and complete) or (not state.edges and _elsewhere(state)):
         return
-    found: dict[tuple[tuple[str, str], ...], list[RosProcess]] = {}
+    by_settings: dict[tuple[tuple[str, str], ...], list[RosProcess]] = {}
     for process in state.processes:
         apart = settings_apart(process.settings, state.settings)
         if apart:
-            found.setdefault(tuple(apart.items()), []).append(process)
-    # Those of this domain first: they are of this robot. Else who was started last, as robots are
-    # that one looks for.
+            by_settings.setdefault(tuple(apart.items()), []).append(process)
+    # Processes in this domain first, because they belong to this robot. Then the newest, because
+    # users usually look for a robot that they have just started.
     order = sorted(
-        found.items(),
+        by_settings.items(),
         key=lambda item: (DOMAIN in dict(item[0]), -max(process.pid for process in item[1])),
     )
     for apart_items, processes in order[:MOST_SETTINGS]:
@@ -124,7 +124,7 @@ def _elsewhere(state: TreeState) -> list[str]:
 
 
 def settings_contradict(state: TreeState) -> Iterator[Finding]:
-    """Environment variables of ROS are invalid, or contradict each other."""
+    """Environment variables of ROS are invalid or contradict each other."""
     settings = state.settings
     value = settings.get(RANGE, "")
     if settings.get(LOCALHOST_ONLY) == "1":
@@ -160,13 +160,13 @@ def settings_contradict(state: TreeState) -> Iterator[Finding]:
 
 
 def settings_apart(theirs: Mapping[str, str], ours: Mapping[str, str]) -> dict[str, str]:
-    """Return the settings that keep processes of one machine from discovering each other."""
+    """Return the settings that prevent processes on this machine from discovering each other."""
     apart = {}
     for name, default in DEFAULTS.items():
         their, our = theirs.get(name) or default, ours.get(name) or default
         if their == our or name == LOCALHOST_ONLY or (name == RANGE and "OFF" not in {their, our}):
             continue
         if name == RMW and not (their and our):
-            continue  # the installation's default, which may be the same
+            continue  # the installation's default, which may be equal
         apart[name] = their
     return apart

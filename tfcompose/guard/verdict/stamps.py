@@ -1,8 +1,8 @@
 """Stamps and clocks: wrong clock, repeated stamps, back in time, too old, too new.
 
-The guard judges stamps message by message, with ``StampHistory`` and ``Clocks``; the doctor judges
-an observer's counts at the end. A stamp is compared with system time, or with simulated time from
-/clock.
+The guard judges the stamps of each message, with ``StampHistory`` and ``Clocks``. The doctor
+judges an observer's counts at the end. Stamps are compared with system time, or with simulated
+time from /clock.
 """
 
 from __future__ import annotations
@@ -25,36 +25,36 @@ if TYPE_CHECKING:
 REPEATED, BACK, WRONG_CLOCK = "TF823", "TF824", "TF825"
 
 _SECOND_NS = 1_000_000_000
-#: Before 2001: no time of day.
+#: A stamp before this date in 2001 is not system time; in nanoseconds.
 _NO_DATE_NS = 10**9 * _SECOND_NS
 KEPT_S = KEPT_NS / _SECOND_NS
-#: A single step back of this size is enough for a finding.
+#: A single step back of this size, in seconds, is enough for a finding.
 LARGE_STEP_S = 1.0
-#: Stamps that are ahead by more make lookups of "now" give a pose of before; nodes that predict do
-#: so by less.
+#: If stamps are ahead by more, in seconds, lookups of the current time return an earlier pose.
+#: Nodes that predict poses stay below this.
 AHEAD_S = 0.15
-#: AMCL and others date what these frames hold forward by up to a second, so that lookups of "now"
-#: do not fail.
+#: AMCL and other nodes stamp edges below these frames up to a second ahead, so that lookups of the
+#: current time succeed.
 LOCALISED_IN, FORWARD_S = ("map", "earth", "world"), 1.1
-#: A simulated clock takes smaller steps.
+#: Steps of a simulated clock are smaller, in seconds.
 CLOCK_STEP_S = 0.5
-#: A message that seems to arrive this much before it was sent comes from a clock that is ahead.
+#: If a message seems to arrive this many seconds before it was sent, the sender's clock is ahead.
 SKEW_S = 0.02
-#: A network is not that slow; a clock may be that late.
+#: A network delays messages by less than this, in seconds. With a larger delay, a clock is behind.
 SLOW_S = 0.25
-#: Judged at the end: this many wrong stamps, and this fraction of all, are no accident.
+#: At the end: this many wrong stamps, and this fraction of all stamps, are a fault.
 FEWEST, PART = 5, 0.3
-#: Judged message by message: this many wrong stamps in a row are no accident, and this many right
-#: ones end the fault.
+#: For each message: this many consecutive wrong stamps are a fault, and as many correct stamps end
+#: it.
 WRONG_IN_A_ROW = 3
-#: Each fault raises the count by the first number, and each right message lowers it by one; the
-#: fault is reported at the second.
+#: A fault raises its count by the first number, and each correct message lowers the count by one.
+#: At the second number the fault is reported.
 REPEAT_COUNTS, REPEATS = 2, 10
 STEP_COUNTS, BACK_STEPS = 4, 12
-#: The speed of simulated time is measured over this time.
+#: The speed of simulated time is measured over this time, in seconds.
 SPEED_OVER_S = 2.0
-#: Simulated time that has not advanced for this time is paused. Shorter than the silence allowed
-#: for an edge.
+#: If simulated time has not advanced for this time, in seconds, it is paused. It must be shorter
+#: than the silence allowed for an edge.
 STANDS_S = 0.3
 
 
@@ -62,10 +62,10 @@ STANDS_S = 0.3
 
 
 def other_clock(stamp_ns: int, received_ns: int, sim_ns: int | None, *, simulated: bool) -> str:
-    """Return how a stamp's clock differs from the expected one; empty: it does not.
+    """Return how a stamp's clock differs from the expected clock; empty if it does not.
 
-    ``received_ns`` is the system time of the arrival, 0 if unknown; ``sim_ns`` the newest time on
-    /clock, None if there is none. ``simulated`` selects the expected one.
+    ``received_ns`` is the system time of the arrival, 0 if unknown. ``sim_ns`` is the newest time
+    on /clock, None without one. ``simulated`` selects the expected clock.
     """
     if stamp_ns == 0:
         return "without a stamp"
@@ -97,18 +97,18 @@ def _off(stamp_ns: int, reference_ns: int) -> str:
     )
 
 
-#: Offsets from UTC of the time scales of receivers and PTP since 2017, in seconds (IERS Bulletin
-#: C; GPS is TAI - 19 s).
+#: Offsets from UTC in seconds of the time scales of GNSS receivers and PTP since 2017 (IERS
+#: Bulletin C; GPS time is TAI - 19 s).
 _SCALES = {37.0: "TAI, which PTP has", 18.0: "the time of GPS"}
-#: A clock that is that near to such an offset has it, in seconds.
+#: Tolerances in seconds for such an offset and for full hours.
 _NEAR_S, _NEAR_HOUR_S = 0.5, 20.0
 _MOST_HOURS = 14
 
 
 def offset_name(ahead_s: float) -> str:
-    """Return the name of the time scale that is ``ahead_s`` seconds ahead of UTC; empty: unknown.
+    """Return the name of the time scale that is ``ahead_s`` seconds ahead of UTC; "" if unknown.
 
-    It continues a sentence: " (TAI, which PTP has)".
+    The text continues a sentence: " (TAI, which PTP has)".
     """
     for offset_s, name in _SCALES.items():
         if abs(ahead_s - offset_s) <= _NEAR_S:
@@ -119,14 +119,14 @@ def offset_name(ahead_s: float) -> str:
 
 
 def _is_since_boot(stamp_ns: int, received_ns: int) -> bool:
-    """Return whether a stamp equals the uptime of this machine; never for a recording."""
+    """Return whether a stamp equals the uptime of this machine. False for a recording."""
     uptime_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
     then_ns = received_ns - (time.time_ns() - uptime_ns)
     return 0 < then_ns <= uptime_ns and abs(stamp_ns - then_ns) <= KEPT_NS
 
 
 def message(code: str, publisher: str, edges: str, detail: str) -> str:
-    """Return the message for stamps that repeat, go back, or are of another clock."""
+    """Return the message for stamps that repeat, go back, or come from another clock."""
     if code == REPEATED:
         return f"{publisher} sends {edges} with the same stamp again and again: {detail}"
     if code == BACK:
@@ -135,7 +135,7 @@ def message(code: str, publisher: str, edges: str, detail: str) -> str:
 
 
 def advice(code: str, detail: str) -> str:
-    """Return the help."""
+    """Return the help for a code about stamps."""
     if code == REPEATED:
         return (
             "tf2 drops all but the first; stamp with the time of the measurement, or send when"
@@ -155,15 +155,15 @@ def advice(code: str, detail: str) -> str:
     return f"{apart}: is a bag played without --clock, or a machine's clock not in sync?"
 
 
-# Message by message.
+# Judgement of each message.
 
 
 @dataclass(slots=True)
 class Clocks:
-    """The clocks of stamps: system time at the arrival of a message, and /clock."""
+    """Reference clocks for stamps: system time at the arrival of a message, and /clock."""
 
     simulated: bool
-    #: The newest time on /clock; None: none yet.
+    #: The newest time on /clock, None before the first.
     sim_ns: int | None = None
     #: Whether a node publishes /clock.
     sent: bool = True
@@ -172,7 +172,7 @@ class Clocks:
     _speed: float = 1.0
 
     def take(self, sim_ns: int | None, now: float) -> None:
-        """Take the newest time on /clock, and its arrival."""
+        """Record the newest time on /clock, and its arrival."""
         self._moved = self._moved if sim_ns == self.sim_ns else now
         self.sim_ns = sim_ns
         if sim_ns is None:
@@ -184,9 +184,9 @@ class Clocks:
             self._since = (now, sim_ns)
 
     def stands(self, now: float) -> bool:
-        """Return whether simulated time came and has stopped.
+        """Return whether simulated time has arrived before and has stopped.
 
-        No node sends during that time, so none counts as silent.
+        While it is stopped, nodes send nothing, so no node counts as silent.
         """
         return (
             self.simulated
@@ -198,7 +198,7 @@ class Clocks:
     def speed(self, now: float) -> float:
         """Return the real-time factor of /clock, at most 1.
 
-        The minimum of the current factor and the one a while ago.
+        This is the minimum of the current factor and the previous one.
         """
         enough = self._since is not None and now - self._since[0] >= SPEED_OVER_S / 4
         return min(self._speed, self._measure_speed(now)) if enough else self._speed
@@ -209,13 +209,13 @@ class Clocks:
         return min(1.0, ((self.sim_ns or 0) - begun_ns) / _SECOND_NS / max(now - begun, 1e-9))
 
     def reference_ns(self, received_ns: int) -> int | None:
-        """Return the time that stamps should have, or None if unknown."""
+        """Return the time that stamps should have, None if unknown."""
         return self.sim_ns if self.simulated else received_ns or None
 
 
 @dataclass(slots=True)
 class StampHistory:
-    """The stamps of one publisher's messages with the same edges."""
+    """The stamps of a publisher's messages with the same edges."""
 
     last: Sequence[int] = ()
     repeats: int = 0
@@ -223,15 +223,15 @@ class StampHistory:
     wrong: int = 0
 
     def judge(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> tuple[str, str]:
-        """Take a message's stamps; return the fault's code and the observation.
+        """Process a message's stamps. Return a fault's code and a description of the observation.
 
         Both are empty if the stamps are correct.
         """
         last, self.last = self.last, stamps_ns
         off = self._clock(stamps_ns, received_ns, clocks)
         step = self._step(stamps_ns, last) if last else ("", "")
-        # A repeated stamp drifts from the clock in time: report only the repetition. A missing
-        # stamp is reported as missing.
+        # A repeated stamp also drifts from the clock, so report only the repetition. Report a
+        # missing stamp as missing.
         if off and (step[0] != REPEATED or not stamps_ns[0]):
             return WRONG_CLOCK, off
         return step
@@ -267,11 +267,11 @@ class StampHistory:
         return other_clock(worst, received_ns, clocks.sim_ns, simulated=clocks.simulated)
 
 
-# At the end.
+# Judgement at the end.
 
 
 def find_repeated_stamps(state: TreeState) -> Iterator[Finding]:
-    """A publisher repeats an edge with the same stamp."""
+    """A publisher sends an edge repeatedly with the same stamp."""
 
     def repeats(edge: EdgeState) -> bool:
         return (
@@ -296,7 +296,7 @@ def stamp_went_back(state: TreeState) -> Iterator[Finding]:
 
 
 def wrong_clock(state: TreeState) -> Iterator[Finding]:
-    """Stamps come from another clock than the others.
+    """Stamps of some edges come from another clock than stamps of other edges.
 
     Simulated and system time are mixed, or stamps are missing.
     """
@@ -320,25 +320,25 @@ def _stamp_finding(
 
 
 def host_clock_off(state: TreeState) -> Iterator[Finding]:
-    """The clock of another machine differs from this one's."""
+    """The clock of another machine differs from this machine's clock."""
     machines: dict[tuple[bool, str], tuple[float, list[str]]] = {}
     for publisher in state.publishers:
         skew = state.skews_s.get(publisher.gid)
         if skew is None or -SLOW_S < skew < SKEW_S or not publisher.node:
             continue
-        known = machines.setdefault((skew > 0, publisher.where), (skew, []))[1]
-        if publisher.node not in known:
-            known.append(publisher.node)
+        states = machines.setdefault((skew > 0, publisher.where), (skew, []))[1]
+        if publisher.node not in states:
+            states.append(publisher.node)
     for (ahead, where), (skew, nodes) in machines.items():
-        there = f" {where}" if where else ""
+        location = f" {where}" if where else ""
         if ahead:
             message = (
-                f"the clock of {list_names(nodes)}{there} is {duration(skew)} ahead of this"
+                f"the clock of {list_names(nodes)}{location} is {duration(skew)} ahead of this"
                 f" machine's{offset_name(skew)}"
             )
         else:
             late = f"{duration(skew)} after they were sent"
-            message = f"messages of {list_names(nodes)}{there} arrive {late}"
+            message = f"messages of {list_names(nodes)}{location} arrive {late}"
         advice = (
             "bring the machines' clocks together (chrony, or timedatectl set-ntp true); stamps"
             " differ by as much"
@@ -348,7 +348,7 @@ def host_clock_off(state: TreeState) -> Iterator[Finding]:
 
 
 def stamps_ahead(state: TreeState) -> Iterator[Finding]:
-    """An edge's stamps are ahead of time."""
+    """An edge's stamps are in the future."""
 
     def ahead(edge: EdgeState) -> bool:
         most = edge.timing.most_delay_s
@@ -394,7 +394,7 @@ def clock_missing(state: TreeState) -> Iterator[Finding]:
 
 
 def two_clocks(state: TreeState) -> Iterator[Finding]:
-    """Two nodes publish the time."""
+    """Two nodes publish /clock."""
     for topic in state.graph:
         if topic.name == "/clock" and len(topic.publishers) > 1:
             message = (
@@ -412,16 +412,16 @@ def two_clocks(state: TreeState) -> Iterator[Finding]:
 def by_publisher(
     state: TreeState, is_so: Callable[[EdgeState], bool]
 ) -> Iterator[list[EdgeState]]:
-    """Yield the moving edges for which ``is_so`` holds, those of one publisher together."""
-    found: dict[object, list[EdgeState]] = {}
+    """Yield the moving edges for which ``is_so`` returns True, grouped by publisher."""
+    states: dict[object, list[EdgeState]] = {}
     for edge in state.moving:
         if is_so(edge):
-            found.setdefault(edge.stream.gid or edge.nodes, []).append(edge)
-    yield from found.values()
+            states.setdefault(edge.stream.gid or edge.nodes, []).append(edge)
+    yield from states.values()
 
 
 def names_of(edges: Sequence[EdgeState]) -> str:
-    """Return the first edge's name, and how many more there are."""
+    """Return the first edge's name, and the number of further edges."""
     return with_more(edges[0].name, len(edges) - 1)
 
 
@@ -434,7 +434,10 @@ def _repeats(edge: EdgeState) -> bool:
 
 
 def _stands_with_the_clock(state: TreeState, edge: EdgeState) -> bool:
-    """Return whether its stamps repeat a /clock that does not advance (another finding)."""
+    """Return whether an edge repeats stamps because /clock does not advance.
+
+    Another finding reports a /clock that does not advance.
+    """
     return (
         state.clock_ns is not None
         and not state.clock_moves
@@ -453,16 +456,19 @@ def _behind_newest_s(edge: EdgeState) -> float:
 
 
 def least_delay_s(edge: EdgeState) -> float:
-    """Return the minimum age of a stamp at its arrival; a repeated stamp only grows older."""
+    """Return the minimum age of a stamp on arrival, in seconds.
+
+    Repeated stamps return 0, because a repeated stamp only grows older.
+    """
     least = edge.timing.least_delay_s
     return 0.0 if least is None or _repeats(edge) else least
 
 
 def _off_clock(state: TreeState, edge: EdgeState, *, simulated: bool) -> str:
-    """Return how the stamps differ from the clock of the others; empty: they do not."""
+    """Return how the stamps differ from the expected clock; empty if they do not."""
     stream = edge.stream
     if stream.stamp_ns and _many(edge, stream.stamps_repeated):
-        return ""  # it is off at last, which follows
+        return ""  # a repeated stamp finally differs from any clock
     return other_clock(
         stream.stamp_ns, stream.arrivals.last_ns, state.clock_ns, simulated=simulated
     )

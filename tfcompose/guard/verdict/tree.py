@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.state import TreeState
 
 
-#: The most publishers of one frame that have a note each.
+#: Maximum number of publishers of a frame that get a note each.
 MOST_NOTES = 8
-#: The effect of two publishers of one frame.
+#: The effect of two publishers of a frame.
 LAST_WINS = "tf2 keeps the last transform it received"
 _FIX = "fix what the node computes it from; until then the frame does not exist"
 _FIX_SOME = "fix what the node computes it from; tf2 uses the messages before and after"
@@ -34,12 +34,12 @@ _NORMALISE = (
 
 
 def way(frames: Sequence[str]) -> str:
-    """Return frames as a path down the tree."""
+    """Return the frames as a path down the tree."""
     return " → ".join(frames)
 
 
 def loop_message(frames: Sequence[str], closed_by: str = "") -> str:
-    """Return the message for a loop of frames, with the publisher that closed it, if known."""
+    """Return the message for a loop of frames, with the publisher that closed it if known."""
     return f"the frames {way(frames)} form a loop" + (
         f", closed by {closed_by}" if closed_by else ""
     )
@@ -51,7 +51,7 @@ def loop_help(end: str) -> str:
 
 
 def self_message(edges: str, publisher: str) -> str:
-    """Return the message for a frame in itself."""
+    """Return the message for a frame that is its own parent."""
     return f"{publisher} publishes {edges}, a frame as its own parent, which tf2 drops"
 
 
@@ -59,7 +59,7 @@ SELF_HELP = "give the node's child frame another name, or disable its TF output"
 
 
 def two_parents_message(child: str, parents: Sequence[tuple[str, str]]) -> str:
-    """Return the message for a frame with several parents, each with its publisher."""
+    """Return the message for a frame with several parents and their publishers."""
     by_parent: dict[str, list[str]] = {}
     for parent, publisher in parents:
         by_parent.setdefault(parent, []).append(publisher)
@@ -75,7 +75,7 @@ def two_parents_message(child: str, parents: Sequence[tuple[str, str]]) -> str:
 
 
 def self_transform(state: TreeState) -> Iterator[Finding]:
-    """A frame is published in itself."""
+    """A frame is published as its own parent."""
     for edge in state.edges:
         if edge.parent == edge.child:
             yield finding(
@@ -88,7 +88,7 @@ def self_transform(state: TreeState) -> Iterator[Finding]:
 
 
 def drops(state: TreeState) -> Iterator[Finding]:
-    """Transforms arrive that every listener drops: no unit quaternion, NaN, an empty name."""
+    """Transforms arrive that every listener drops: no unit quaternion, NaN, or an empty name."""
     for edge in state.edges:
         yield from rejected_transforms(edge)
 
@@ -114,11 +114,11 @@ def rejected_transforms(edge: EdgeState) -> Iterator[Finding]:
 
 def slash_in_front(state: TreeState) -> Iterator[Finding]:
     """Names begin with a slash, which tf2 strips from messages but rejects in lookups."""
-    found: dict[str, list[EdgeState]] = {}
+    states: dict[str, list[EdgeState]] = {}
     for edge in state.taken:
         if edge.stream.slashed:
-            found.setdefault(who(edge), []).append(edge)
-    for publisher, edges in found.items():
+            states.setdefault(who(edge), []).append(edge)
+    for publisher, edges in states.items():
         named = with_more(edges[0].name, len(edges) - 1)
         message = (
             f"{publisher} publishes {named} with a slash in front of a frame's name, which tf2"
@@ -131,7 +131,7 @@ def slash_in_front(state: TreeState) -> Iterator[Finding]:
 
 
 def loop(state: TreeState) -> Iterator[Finding]:
-    """Frames are each other's ancestors, so that tf2 finds no path through them."""
+    """Frames are ancestors of each other, so tf2 finds no path between them."""
     for frames in loops(_pairs(state)):
         on_it = [edge for edge in state.taken if _is_on(edge, frames)]
         message = loop_message((*frames, frames[0]))
@@ -151,7 +151,7 @@ def loop(state: TreeState) -> Iterator[Finding]:
 
 
 def second_parent(state: TreeState) -> Iterator[Finding]:
-    """A frame has two parents; tf2 uses the one received last."""
+    """A frame has two parents, and tf2 uses the parent received last."""
     above, planned = _above(state), state.planned
     in_loops = {frame for frames in loops(_pairs(state)) for frame in frames}
     for child, edges in above.items():
@@ -159,7 +159,7 @@ def second_parent(state: TreeState) -> Iterator[Finding]:
         if len(parents) < 2 or child in in_loops or child in planned:  # noqa: PLR2004 (two parents)
             continue
         if _hands_over(edges):
-            continue  # one node hands it over, which is what a gripper does
+            continue  # a single node switches its parent, as a gripper does
         message = two_parents_message(child, [(edge.parent, who(edge)) for edge in edges])
         notes = [Note(_describe_edge(state, edge)) for edge in edges[:MOST_NOTES]]
         nodes = {who(edge) for edge in edges}
@@ -171,19 +171,19 @@ def second_parent(state: TreeState) -> Iterator[Finding]:
 
 
 def two_trees(state: TreeState) -> Iterator[Finding]:
-    """Frames are in unconnected trees."""
-    found = trees_of(state)
+    """The frames form several unconnected trees."""
+    trees = trees_of(state)
     expected = (
         {edge.parent for edge in state.plan.edges} - state.planned if state.plan else frozenset()
     )
-    if len(found) < 2 or set(found) <= expected:  # noqa: PLR2004 (one tree is right)
+    if len(trees) < 2 or set(trees) <= expected:  # noqa: PLR2004 (one tree is right)
         return
-    first, *others = found
-    for root in others:
-        if found[root] & found[first]:
-            continue  # a frame with two parents connects them, and is a finding of its own
-        message = f"nothing connects {_tree(root, found[root])} with {_tree(first, found[first])}"
-        publishers = {who(edge): None for edge in state.taken if edge.child in found[root]}
+    first, *further_roots = trees
+    for root in further_roots:
+        if trees[root] & trees[first]:
+            continue  # a frame with two parents connects them, which another finding reports
+        message = f"nothing connects {_tree(root, trees[root])} with {_tree(first, trees[first])}"
+        publishers = {who(edge): None for edge in state.taken if edge.child in trees[root]}
         notes = [
             Note(f"{root} and what is below it is published by {list_names(list(publishers))}")
         ]
@@ -192,27 +192,27 @@ def two_trees(state: TreeState) -> Iterator[Finding]:
             message,
             None,
             notes=notes,
-            help=_bridge(state, root, found[first], found[root]),
+            help=_bridge(state, root, trees[first], trees[root]),
         )
 
 
 def trees_of(state: TreeState) -> dict[str, set[str]]:
     """Return the frames of each tree by its root, the largest tree first.
 
-    Frames on loops have no root.
+    Frames on loops belong to no tree.
     """
     return trees(_pairs(state))
 
 
-def _bridge(state: TreeState, root: str, main: set[str], own: set[str]) -> str:
+def _bridge(state: TreeState, root: str, main: set[str], frames: set[str]) -> str:
     """Return the help to connect the tree below ``root`` with the main one."""
     for edge in state.plan.edges if state.plan else ():
-        if (edge.parent in main) != (edge.child in main) and (edge.parent in own) != (
-            edge.child in own
+        if (edge.parent in main) != (edge.child in main) and (edge.parent in frames) != (
+            edge.child in frames
         ):
             return f"{edge.name} is missing: {edge.owner} ({edge.node}) should publish it"
     for joint in state.moving_joints:
-        if {joint.parent, joint.child} & own and {joint.parent, joint.child} & main:
+        if {joint.parent, joint.child} & frames and {joint.parent, joint.child} & main:
             return (
                 f"{joint.parent} → {joint.child} is missing: the joint {joint.name} of"
                 " robot_description moves it"
@@ -241,7 +241,7 @@ def _describe_edge(state: TreeState, edge: EdgeState) -> str:
 
 
 def _hands_over(edges: list[EdgeState]) -> bool:
-    """Return whether all come from one publisher that alternates between parents."""
+    """Return whether all edges come from a single publisher that alternates between parents."""
     handover = edges[0].stream.handover
     return handover is not None and handover.is_one and len(handover.streams) == len(edges)
 

@@ -1,11 +1,11 @@
 """Compares a plan with a running tree or a recording, edge by edge.
 
-Fixed poses are compared by value: those that tfcompose publishes, those that another owner sends
-on /tf_static if the robot file gives a pose, and the fixed part of a joint's pose. Frames inside a
-sensor that its driver publishes may be calibrated. They are compared as precisely as the preset
-claims to know them.
+Fixed poses are compared by value: poses that tfcompose publishes, poses on /tf_static from another
+owner if the robot file states a pose, and the fixed part of a joint's pose. A driver may publish
+calibrated frames inside a sensor. These frames are compared with the precision that the preset
+claims.
 
-``verify`` has a verdict for each edge; the doctor reports differences of one kind and one
+``verify`` returns a verdict for each edge. The doctor reports differences of the same kind and
 publisher together.
 """
 
@@ -57,35 +57,35 @@ if TYPE_CHECKING:
 
 #: Minimum number of messages to judge a rate.
 FEWEST = 4
-#: Time that a publisher may stay without a name before it is judged anyway.
+#: Time in seconds after which a publisher without a name is judged.
 NAMELESS_S = 0.7
-#: Maximum number of wrong poses that are listed.
+#: Maximum number of wrong poses that a finding lists.
 MOST_POSES = 6
 _TURNING = frozenset({"revolute", "continuous"})
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One deviation of one edge; its code determines which of the later fields are set."""
+    """A deviation of an edge. Its code determines which of the later fields are set."""
 
     code: str
-    #: The planned edge; None: undeclared.
+    #: The planned edge, None for an undeclared edge.
     edge: PlanEdge | None
-    #: The observed edge; None: not received.
+    #: The observed edge, None for an edge that never arrived.
     live: EdgeState | None = None
     fault: Fault | None = None
-    #: The preset's frame whose pose the driver sends differently.
+    #: The frame of a preset whose pose the driver sends differently.
     driver: Expected | None = None
-    #: Deviation of the pose, regardless of its sender.
+    #: Deviation of the pose from the plan, regardless of its sender.
     off: Offset | None = None
     #: Time without a message, in seconds.
     silence_s: float = 0.0
-    #: True: the silence has ended.
+    #: Whether the silence has ended.
     over: bool = False
 
 
 def differences(state: TreeState, plan: Plan, tolerance: Offset = SAME_POSE) -> list[Difference]:
-    """Return the differences from the plan: its edges in order, then undeclared ones."""
+    """Return the differences from the plan: planned edges in order, then undeclared edges."""
     comparison = _Comparison(state, plan, tolerance)
     planned = [
         difference for edge in plan.edges for difference in comparison.compare_planned(edge)
@@ -106,21 +106,20 @@ class _Comparison:
         present = {
             node for edge in self.state.edges if edge.present is not False for node in edge.nodes
         }
-        others = stand_ins(self.plan)
-        # The stock nodes that may send an edge in its owner's place, where that is not there; by
-        # the edge's child.
+        stand_ins_by_child = stand_ins(self.plan)
+        # Stock nodes that may send an edge if its owner is absent, by the edge's child.
         self._stand_ins = {
-            edge.child: others[edge.child]
+            edge.child: stand_ins_by_child[edge.child]
             for edge in self.plan.edges
-            if edge.child in others and edge.node not in present
+            if edge.child in stand_ins_by_child and edge.node not in present
         }
 
     @cached_property
     def by_child(self) -> dict[str, list[EdgeState]]:
-        found: dict[str, list[EdgeState]] = {}
+        states: dict[str, list[EdgeState]] = {}
         for edge in self.state.edges:
-            found.setdefault(edge.child, []).append(edge)
-        return found
+            states.setdefault(edge.child, []).append(edge)
+        return states
 
     @cached_property
     def drivers(self) -> dict[str, Expected]:
@@ -141,7 +140,7 @@ class _Comparison:
             if edge.may_hang_on(observed.parent)
             and (not observed.nodes or self._may_own(edge, observed))
         ]
-        if owners:  # one that was started again is judged by what came last
+        if owners:  # for a restarted owner, the newest messages count
             newest = max(
                 owners,
                 key=lambda observed: (
@@ -173,11 +172,11 @@ class _Comparison:
                 if code == "TF801" and stream.rejected_row is not stream.row
                 else None
             )
-            found = self._faulty(code, edge, observed)
+            fault = self._faulty(code, edge, observed)
             yield (
-                replace(found, off=off)
+                replace(fault, off=off)
                 if off is not None and off.beyond(self.tolerance)
-                else found
+                else fault
             )
 
     def _faulty(
@@ -197,7 +196,7 @@ class _Comparison:
         return Difference(code, edge, observed, fault)
 
     def _twice(self, edge: PlanEdge, some: Sequence[EdgeState]) -> Iterator[Difference]:
-        """Judge several publishers with the owner's name."""
+        """Report several publishers with the owner's name."""
         namesakes: dict[bytes | None, EdgeState] = {}
         for observed in sorted(some, key=lambda observed: observed.stream.first_ns):
             if (
@@ -211,8 +210,8 @@ class _Comparison:
             for namesake in namesakes.values()
             if namesake.stream.static == next(iter(namesakes.values())).stream.static
         ]
-        for other in of_kind[1:]:
-            yield self._faulty("TF801", edge, other, namesake=True)
+        for duplicate in of_kind[1:]:
+            yield self._faulty("TF801", edge, duplicate, namesake=True)
 
     def _may_own(self, edge: PlanEdge, observed: EdgeState) -> bool:
         return may_be_owners(
@@ -224,7 +223,7 @@ class _Comparison:
         if stream.rejected_row is stream.row or not edge.may_hang_on(stream.parent):
             return
         if observed.nodes and not self._may_own(edge, observed):
-            return  # somebody else's value is reported with who it is
+            return  # another finding reports a value from another node
         driver = self.drivers.get(edge.child)
         if driver is not None:
             if is_off(driver, stream.pose):
@@ -235,7 +234,7 @@ class _Comparison:
             yield Difference("TF846", edge, observed, off=off)
 
     def _off(self, edge: PlanEdge, pose: Pose) -> Offset | None:
-        """Return the deviation from the fixed part of the pose; None if no part is fixed."""
+        """Return the deviation from the fixed part of the pose, None if no part is fixed."""
         off = offset_of(edge.pose, pose)
         if edge.joint is not None:
             if edge.joint.type in _TURNING:
@@ -246,7 +245,7 @@ class _Comparison:
 
 
 def _times(edge: PlanEdge, observed: EdgeState, *, simulated: bool) -> Iterator[Difference]:
-    """Judge whether it arrives, and often enough.
+    """Report an edge that does not arrive or arrives too rarely.
 
     A simulation may run slower than real time.
     """
@@ -272,7 +271,7 @@ def _times(edge: PlanEdge, observed: EdgeState, *, simulated: bool) -> Iterator[
 
 
 def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
-    """Return the help for an edge that was never received."""
+    """Return the help for an edge that never arrived."""
     planned = {edge.child for edge in plan.edges}
     strangers = [edge.child for edge in state.edges if edge.child not in planned]
     advice = did_you_mean(edge.child, strangers)
@@ -295,10 +294,10 @@ def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
 # Differences as findings.
 
 
-def group_differences(found: Iterable[Difference]) -> list[list[Difference]]:
-    """Return groups of differences to report together, ordered by the first of each."""
+def group_differences(differences: Iterable[Difference]) -> list[list[Difference]]:
+    """Return groups of differences to report together, ordered by their first members."""
     groups: dict[tuple[object, ...], list[Difference]] = {}
-    for finding in found:
+    for finding in differences:
         groups.setdefault(_key(finding), []).append(finding)
     return list(groups.values())
 
@@ -310,7 +309,7 @@ def group_finding(
     span: Span | None = None,
     slow_is: Severity = "warning",
 ) -> Finding:
-    """Return the finding for differences of one group.
+    """Return the finding for the differences of a group.
 
     ``span`` is the first edge's place in the robot file.
     """
@@ -320,7 +319,7 @@ def group_finding(
         if first.fault
         else _difference_finding(group, state, plan, span, slow_is)
     )
-    # Advice on running nodes is useless for a recording.
+    # Advice about running nodes is useless for a recording.
     return (
         replace(finding, help="")
         if state.recorded and first.code in {"TF804", "TF805", "TF846"}
@@ -393,17 +392,17 @@ def _fault_finding(group: Group, state: TreeState, plan: Plan, span: Span | None
     if not faults[0].namesake:
         return finding
     gids = {difference.live.stream.gid for difference in group if difference.live}
-    others = [
+    namesakes = [
         publisher
         for publisher in state.publishers
         if publisher.node in faults[0].nodes and publisher.gid not in gids and publisher.where
     ]
-    notes = [Note(f"{publisher.node} runs {publisher.where}") for publisher in others]
+    notes = [Note(f"{publisher.node} runs {publisher.where}") for publisher in namesakes]
     return replace(finding, notes=(*finding.notes, *dict.fromkeys(notes)))
 
 
 def _elsewhere(group: Group) -> list[Note]:
-    """Return the deviations of poses from nodes other than the owner."""
+    """Return notes about deviating poses from nodes other than the owner."""
     off = [
         (difference.fault, difference.off)
         for difference in group
@@ -430,26 +429,26 @@ def _poses(group: Group, span: Span | None) -> Finding:
     return pose_differs(off, publisher, span)
 
 
-# Of a whole plan.
+# Comparison of a complete plan.
 
 
 def differs_from_plan(state: TreeState) -> Iterator[Finding]:
     """The published tree differs from the plan."""
     if state.plan is None or not (state.edges or state.publishers):
-        return  # nobody publishes at all, which is another finding
-    found = [
+        return  # no node publishes TF, which another finding reports
+    differing = [
         difference for difference in differences(state, state.plan) if difference.code != SELF
-    ]  # found for every edge, planned or not
-    for group in group_differences(found):
+    ]  # other checks find these for all edges
+    for group in group_differences(differing):
         yield group_finding(group, state, state.plan)
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Result for an edge; no findings if it is as expected."""
+    """Result for an edge, without findings if the edge is as expected."""
 
     edge: str
-    #: None: undeclared; empty: the finding concerns the whole tree.
+    #: The owner, None for an undeclared edge; empty for a finding about the entire tree.
     owner: str | None
     findings: tuple[Finding, ...]
 
@@ -460,27 +459,29 @@ def verify(
     tolerance: Offset,
     places: Mapping[str, Span] | None = None,
 ) -> list[Verdict]:
-    """Return a verdict for each planned edge, in order, then for each unplanned one.
+    """Return a verdict for each planned edge, in order, then for each unplanned edge.
 
     ``places`` has the edges' places in the robot file, by child.
     """
-    found: dict[str, list[Finding]] = {edge.child: [] for edge in plan.edges}
+    findings: dict[str, list[Finding]] = {edge.child: [] for edge in plan.edges}
     extra = []
     for topics, part in parts_of(plan).items():
         state = state_of(observers[topics], topics)
         for edge in state.edges:
-            if edge.child in found:
-                found[edge.child] += rejected_transforms(edge)
-                found[edge.child] += _wrong_times(edge, state, part)
+            if edge.child in findings:
+                findings[edge.child] += rejected_transforms(edge)
+                findings[edge.child] += _wrong_times(edge, state, part)
         for difference in differences(state, part, tolerance):
-            # The parts of a plan differ in their edges only; a process is looked up in the whole.
+            # The parts of a plan have different edges but the same processes. Look up processes in
+            # the complete plan.
             span = (places or {}).get(difference.edge.child) if difference.edge else None
             reported = group_finding([difference], state, plan, span, slow_is="error")
             if difference.edge is None and difference.live is not None:
                 extra.append(Verdict(difference.live.name, None, (reported,)))
             elif difference.edge is not None:
-                found[difference.edge.child].append(reported)
-        # An edge that its owner hands over has one parent after the other, and closes no loop.
+                findings[difference.edge.child].append(reported)
+        # An edge whose owner switches its parent has one parent after the other, and closes no
+        # loop.
         switched = {edge.child for edge in part.edges if edge.switched}
         lasting = tuple(edge for edge in state.edges if edge.child not in switched)
         in_all = (
@@ -495,21 +496,23 @@ def verify(
         Verdict(list_names({each.topic for each in sent}), "", (finding,)) for finding in of_joints
     ]
     return [
-        *(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges),
+        *(Verdict(edge.name, edge.owner, tuple(findings[edge.child])) for edge in plan.edges),
         *extra,
     ]
 
 
-#: A listener's buffer keeps this much, in seconds: what is as late is gone when it comes.
+#: A listener's buffer keeps transforms for this time, in seconds. If a stamp is older on arrival,
+#: its transform is dropped.
 _KEPT_S = KEPT_NS / 1e9
-#: Stamps that are so far ahead, in seconds, are of another clock, not for smoothness.
+#: Stamps that are farther ahead, in seconds, come from another clock, not from a node that
+#: predicts.
 _AHEAD_S = 1.0
 
 
 def _wrong_times(edge: EdgeState, state: TreeState, plan: Plan) -> Iterator[Finding]:
-    """Find stamps that make lookups at the current time fail for an edge.
+    """Yield findings about stamps that make lookups at the current time fail.
 
-    These are the doctor's checks; whether simulated time advances is unknown here.
+    These are the doctor's checks. Whether simulated time advances is unknown here.
     """
     if plan.ros.clock == "sim":
         return
@@ -524,12 +527,12 @@ def _wrong_times(edge: EdgeState, state: TreeState, plan: Plan) -> Iterator[Find
 
 
 def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
-    """Return what an observer has received on the topics (moving, fixed)."""
+    """Return the state that an observer has received on the topics (moving, fixed)."""
     return TreeState(
         max(0, observer.until_ns - observer.begun_ns) / 1e9,
         topics,
         tuple(observer.edges(observer.until_ns)),
-        tuple(observer.publishers.known.values()),
+        tuple(observer.publishers.by_gid.values()),
         observer.nodes,
         beyond=dict(observer.beyond),
         recorded=observer.recorded,
@@ -537,7 +540,7 @@ def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
 
 
 def summary(verdicts: Sequence[Verdict]) -> str:
-    """Return one line: how many edges are as expected, and how many are undeclared."""
+    """Return a line with the numbers of expected and undeclared edges."""
     planned = [verdict for verdict in verdicts if verdict.owner]
     right = sum(not verdict.findings for verdict in planned)
     extra = sum(verdict.owner is None for verdict in verdicts)

@@ -1,5 +1,5 @@
-"""tfcompose's own publishers: static edges, moving joints, simulations, robot description.
+"""tfcompose's publishers: static edges, moving joints, simulated owners, robot description.
 
-Each is a process of the plan: ``tfcompose static PLAN_FILE PROCESS_NAME``, ``joints``,
-``simulate``.
+Each publisher is a process of the plan. Its command line is ``tfcompose static PLAN_FILE
+PROCESS_NAME``, or the same with ``joints`` or ``simulate``.
 """

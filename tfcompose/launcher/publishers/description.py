@@ -1,4 +1,4 @@
-"""The robot description: latched, and compared with descriptions from other nodes."""
+"""The robot description: published latched, and compared with descriptions from other nodes."""
 
 from __future__ import annotations
 
@@ -7,56 +7,68 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.model.files import with_absolute_addresses
 from tfcompose.tf.process import say
-from tfcompose.tf.ros.graph import BARE_DDS, UNKNOWN_NODE, writers
-from tfcompose.tf.ros.node import LATCHED, TextSubscription, latch
+from tfcompose.tf.ros.graph import BARE_DDS, UNKNOWN_NODE, gid_of, writers
+from tfcompose.tf.ros.node import LATCHED, TextSubscription, latch, send_text
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from tfcompose.tf.process import Own
+    from tfcompose.tf.process import OwnProcess
+    from tfcompose.tf.ros.node import Received
 
 TOPIC = "robot_description"
-#: Period of a process's checks while it waits for something, in seconds.
+#: Interval between checks while a process waits, in seconds.
 CHECK_EVERY_S = 0.5
 _MOST_NAMED = 16
 _NAMED_WITHIN_S = 3.0
 
 
 class DescriptionPublisher:
-    """The plan's description, published for all subscribers while this object lives.
+    """Publisher of the plan's robot description, for as long as the object exists.
 
-    The plan says what moves and who publishes it, so another description on the topic changes
-    nothing here. But subscribers of the topic take the newest one, so the process warns about it.
+    Publishers of TF follow the plan, so another description on the topic does not affect them. But
+    subscribers use the newest description, so the process warns about other publishers.
     """
 
-    def __init__(self, own: Own, node: Node) -> None:
+    def __init__(self, own_process: OwnProcess, node: Node) -> None:
         self._node = node
         self._publisher: Any = None
         self._named: set[bytes | None] = set()
         self._unnamed: dict[bytes | None, float] = {}
+        self._text = ""
+        self.follow(own_process)
+        self.subscription = TextSubscription(node, TOPIC, LATCHED)
+
+    def follow(self, own_process: OwnProcess) -> None:
+        """Publish the description of the process's plan, if it differs from the last one."""
         try:
-            text = own.description.read_text(encoding="utf-8")
+            text = own_process.description.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             say(f"no robot_description: {error}")
-            self._text = ""
-        else:
-            self._text = with_absolute_addresses(text, own.description.parent)
-            self._publisher = latch(node, TOPIC, self._text)
-        self.subscription = TextSubscription(node, TOPIC, LATCHED)
+            return
+        before, self._text = (
+            self._text,
+            with_absolute_addresses(text, own_process.description.parent),
+        )
+        if self._publisher is None:
+            self._publisher = latch(self._node, TOPIC, self._text)
+        elif self._text != before:
+            send_text(self._publisher, self._text)
 
     @property
     def is_waiting(self) -> bool:
         """Whether ``check`` should be called again soon.
 
-        A publisher is discovered before its node's name is.
+        The name of a publisher's node is discovered later than the publisher.
         """
         return bool(self._unnamed)
 
     def check(self) -> None:
-        """Read new messages, and warn once about each publisher of another description."""
+        """Read new messages. Warn once about each publisher of a different description."""
         for received, text in self.subscription.take_texts():
             if (
                 text != self._text
+                and not self._is_own(received)
                 and received.gid not in self._named
                 and len(self._named) < _MOST_NAMED
             ):
@@ -71,6 +83,10 @@ class DescriptionPublisher:
                     f" {self.subscription.topic}, and readers use the newest; TF keeps following"
                     " the plan (to change TF, edit the robot file and restart)"
                 )
+
+    def _is_own(self, received: Received) -> bool:
+        """Return whether this object published it: the text before the current one."""
+        return self._publisher is not None and received.raw_gid == gid_of(self._publisher)
 
     def _name(self, gid: bytes | None) -> str | None:
         names = [

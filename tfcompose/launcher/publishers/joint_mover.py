@@ -1,11 +1,11 @@
-"""Conversion of joint states to TF messages, bytes to bytes.
+"""Conversion of serialised joint states to serialised TF messages.
 
 Unusable joint states are reported and dropped.
 
-The pose of a joint's edge is its pose at 0 followed by the motion (URDF). For a turn about the
-unit axis a that is p₀, q₀·(a sin q/2, cos q/2) = cos q/2 · q₀ + sin q/2 · q₀·(a, 0); for a slide
-p₀ + q · R₀a, q₀. Both are linear in functions of the position, so that all joints are computed at
-once.
+The pose of a joint's edge is its pose at position 0, followed by the motion (URDF). For a rotation
+about the unit axis a this is p₀, q₀·(a sin q/2, cos q/2) = cos q/2 · q₀ + sin q/2 · q₀·(a, 0). For
+a translation it is p₀ + q · R₀a, q₀. Both are linear in functions of the position, so all joints
+can be computed at once.
 """
 
 from __future__ import annotations
@@ -30,37 +30,37 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.joint_codec import JointNames
 
 _SECOND_NS = 1_000_000_000
-# Joint states come with one list of names from each driver; one that never repeats itself must not
-# fill the memory.
+# Maximum number of different lists of names to remember. Usually each driver sends its own list. A
+# driver that never repeats a list must not fill the memory.
 _MOST_SOURCES = 64
-# Maximum number of faults that are reported; each sentence, which may hold a name, is reported
+# Maximum number of different lines about faults. Each line, which may contain a name, is printed
 # once.
 _MOST_LINES = 64
 
 
 @dataclass(frozen=True, slots=True)
 class PublishOptions:
-    """Publishing options of joint states, with the names that robot_state_publisher uses."""
+    """Options for publishing joint states, named like robot_state_publisher's parameters."""
 
-    #: In Hz, the highest rate for joint states with the same names; 0: no limit.
+    #: Maximum rate, in Hz, of joint states with the same names; 0 for no limit.
     publish_frequency: float = 0.0
-    #: True: publish whatever the stamp, even a repeated one or one above the highest rate.
+    #: Whether to publish regardless of stamps: repeated stamps, and rates above the maximum.
     ignore_timestamp: bool = False
 
 
 def positions_of(names: JointNames, data: bytes) -> NDArray[np.float64]:
-    """Return the positions of a message with these names: rad or m, shape (names,).
+    """Return the positions in a message with these names: rad or m, shape (names,).
 
     Raises:
-        ValueError: if it has another number of positions.
+        ValueError: if the message has a different number of positions.
     """
-    at = names.positions_at(data)
-    return np.frombuffer(data, f"{names.order}f8", len(names.names), at)
+    offset = names.positions_at(data)
+    return np.frombuffer(data, f"{names.order}f8", len(names.names), offset)
 
 
 @dataclass(slots=True)
 class _Source:
-    """Joint states with the same names, and the newest stamp in nanoseconds."""
+    """Joint states with the same list of names, and their newest stamp in nanoseconds."""
 
     names: JointNames
     moving: JointGroup | None
@@ -69,11 +69,11 @@ class _Source:
 
 
 class JointMover:
-    """The moving edges of a plan.
+    """Converts joint states for the moving edges of a plan.
 
-    ``say`` receives lines for the user. ``now_ns`` returns the time for a message without a stamp,
-    given its arrival in nanoseconds, or None while there is none: messages sent by hand often have
-    no stamp.
+    ``say`` receives lines for the user. Messages sent by hand often have no stamp. For these,
+    ``now_ns`` returns the time in nanoseconds for a message that arrived at a given time, or None
+    if no time is known yet.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class JointMover:
 
     @property
     def missing(self) -> list[str]:
-        """The joints that no joint state has moved yet, without those that mimic them."""
+        """Joints that no joint state has moved yet, without joints that mimic one of them."""
         names = {
             joint.name for index, joint in enumerate(self._all_joints) if index not in self._moved
         }
@@ -121,7 +121,7 @@ class JointMover:
         ]
 
     def tf_message(self, data: bytes, received_ns: int) -> bytes | None:
-        """Return a joint state as a TFMessage, or None if it moves nothing."""
+        """Return a joint state as a TFMessage, None if it moves no joint."""
         try:
             source = self._source(data)
             if source.moving is None:
@@ -142,9 +142,7 @@ class JointMover:
         names = read_names(data)
         names.positions_at(data)
         for source in self._sources:
-            if (
-                source.names.names == names.names
-            ):  # with another frame, or other bytes between the names
+            if source.names.names == names.names:  # the frame or padding bytes differ
                 source.names = names
                 return source
         if len(self._sources) >= _MOST_SOURCES:
@@ -158,11 +156,11 @@ class JointMover:
         return self._sources[-1]
 
     def _is_due(self, source: _Source, stamp_ns: int) -> bool:
-        """Return whether a joint state with this stamp is published, and record that it is.
+        """Return whether to publish a joint state with this stamp, and record the stamp.
 
-        tf2 takes only the first transform with a given stamp, and every listener warns about the
-        others. An earlier stamp comes from a recording that starts over, or from a second source.
-        It is published: tf2 sorts.
+        tf2 accepts only the first transform with a given stamp, and every listener warns about
+        further ones. An earlier stamp comes from a recording that starts again, or from a second
+        source. Such a joint state is published, because tf2 sorts transforms by stamp.
         """
         if self._ignores_time:
             return True
@@ -171,8 +169,8 @@ class JointMover:
                 "skipped a joint state with the same stamp as the previous one (reported once)"
             )
             return False
-        # Half a period early is in time: the next one is due a period after this one was, so that
-        # a source's jitter leaves nothing out and the mean stays.
+        # A message may be up to half a period early. The next due time is a period after the
+        # previous due time, so jitter of the source drops no messages and the mean rate stays.
         early_ns = source.due_ns - self._period_ns // 2
         if self._period_ns and source.last_ns is not None and source.last_ns < stamp_ns < early_ns:
             hertz = _SECOND_NS / self._period_ns
@@ -197,10 +195,10 @@ class JointMover:
 
 
 class JointGroup:
-    """The edges that joint states with one list of names move, as one message.
+    """The edges that joint states with a given list of names move, as a TF message.
 
-    ``edges`` and ``joints`` are in the order of the indices in ``followed``; positions are in rad,
-    or m for a prismatic joint.
+    ``edges`` and ``joints`` have the order of the indices in ``followed``. Positions are in rad,
+    or in m for a prismatic joint.
     """
 
     def __init__(
@@ -221,7 +219,8 @@ class JointGroup:
         self._message = ArrayTemplate(
             [(e.parent, e.child) for e, _ in moved], [e.pose for e, _ in moved]
         )
-        # One row a component and one column a joint: numpy is fast along long rows.
+        # A row for each component and a column for each joint, because numpy is fast along long
+        # rows.
         self._quat_at = self._message.quat_at[:turning].T.copy()
         self._xyz_at = self._message.xyz_at[turning:].T.copy()
         poses = [(edge.pose, joint.axis) for edge, joint in moved]
@@ -234,11 +233,11 @@ class JointGroup:
         self._along = _columns([rotate(pose.quat_xyzw, axis) for pose, axis in sliding], 3)
 
     def message(self, positions: NDArray[np.float64], stamp_ns: int) -> bytes:
-        """Return the TFMessage for these positions, in the names' order, at a stamp in ns.
+        """Return the TFMessage for positions, in the order of the names, with a stamp in ns.
 
         Raises:
-            ValueError: if a position is not finite or a message cannot hold the time; the same
-                fault has the same sentence.
+            ValueError: if a position is not finite, or the message type cannot hold the time. A
+                fault always has the same text.
         """
         q = positions[self._columns].astype(np.float64, copy=False)
         if not np.isfinite(q).all():

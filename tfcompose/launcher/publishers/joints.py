@@ -1,4 +1,4 @@
-"""Joints process: turns joint states into edges on /tf, and names missing joints."""
+"""The ``joints`` process: converts joint states to edges on /tf, and reports missing joints."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.signals import Stop
     from tfcompose.launcher.publishers.joint_mover import JointMover
-    from tfcompose.tf.process import Own
+    from tfcompose.tf.process import OwnProcess
 
 MISSING_AFTER_S = 5.0
 _NAMED_AT_MOST = 8
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run the process that PLAN_FILE PROCESS_NAME names, and return the exit code."""
+    """Run the process with arguments PLAN_FILE PROCESS_NAME, and return the exit code."""
     return start(argv, "joints", joints)
 
 
-def joints(own: Own, stop: Stop) -> None:
+def joints(own_process: OwnProcess, stop: Stop) -> None:
     """Publish the moving edges of each ``joint_states`` message.
 
-    Latches the description if no ``static`` process does.
+    Also publish the robot description if the plan has no ``static`` process for it.
     """
     # ROS, once signals are handled.
     from tfcompose.launcher.publishers.description import CHECK_EVERY_S, DescriptionPublisher  # noqa: PLC0415
@@ -45,19 +45,25 @@ def joints(own: Own, stop: Stop) -> None:
     # ROS, once signals are handled.
     from tfcompose.tf.ros.sensor_data import JointStateSubscription  # noqa: PLC0415
 
-    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
+    with open_node(
+        own_process.node_name, own_process.namespace, args=own_process.ros_args
+    ) as node:
         options = PublishOptions(
             parameter(node, "publish_frequency", 0.0),
             parameter(node, "ignore_timestamp", default=False),
         )
-        clock = StampClock(node, say, sim=own.plan.ros.clock == "sim")
-        mover = JointMover(own.edges, say, clock.now_ns, options)
+        clock = StampClock(node, say, sim=own_process.plan.ros.clock == "sim")
+        mover = JointMover(own_process.edges, say, clock.now_ns, options)
         publisher = TFPublisher(node, static=False)
         states = JointStateSubscription(node)
         if not wait_for_go(stop):
             return
-        states.take()  # what came while it was held is old
-        description = DescriptionPublisher(own, node) if own.plan.describes(own.process) else None
+        states.take()  # messages from before the start are outdated
+        description = (
+            DescriptionPublisher(own_process, node)
+            if own_process.plan.describes(own_process.process)
+            else None
+        )
         at_most = (
             f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""
         )
@@ -81,7 +87,7 @@ def joints(own: Own, stop: Stop) -> None:
 
 
 class _Missing:
-    """Names once, after some seconds, the joints missing from all joint states."""
+    """Reports once, after some seconds, the joints that no joint state contains."""
 
     def __init__(self, mover: JointMover, topic: str, publishers: Callable[[], list[str]]) -> None:
         self._mover, self._topic, self._publishers = mover, topic, publishers

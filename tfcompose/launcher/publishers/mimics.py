@@ -1,4 +1,4 @@
-"""Joints whose positions a message determines: those it names, and those that mimic them."""
+"""Joints whose positions a message determines: named joints, and joints that mimic these."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ class Followed:
     #: Index into the message's positions.
     column: int
     multiplier: float
-    #: In radians, or metres for a prismatic joint.
+    #: In rad, or in m for a prismatic joint.
     offset: float
 
 
 class Joints:
-    """Joints with a single position each, and their mimics.
+    """Joints with a single position each, and the joints that mimic them.
 
-    A mimic follows its joint, through chains and in any order: multiplier · q + offset at each
-    step. As in robot_state_publisher, a position sent for the mimic itself takes precedence. A
-    message determines only the joints that it names, and their mimics: any other joint was
-    measured at another time, and the message's stamp would be wrong for it. Joints that mimic each
-    other in a circle are never determined.
+    A mimicking joint follows its joint, even through chains in any order. At each step its
+    position is multiplier · q + offset. As in robot_state_publisher, a position in the message for
+    the mimicking joint itself takes precedence. A message determines only the joints that it
+    names, and joints that mimic these. Another joint was measured at a different time, so the
+    message's stamp would be wrong for it. Joints that mimic each other in a circle are never
+    determined.
     """
 
     def __init__(self, joints: Sequence[PlanJoint]) -> None:
@@ -44,13 +45,15 @@ class Joints:
     def follow(self, names: Sequence[str]) -> list[Followed]:
         """Return the joints that a message with these names determines.
 
-        The first of two equal names counts.
+        If a name is repeated, its first position counts.
         """
         columns: dict[str, int] = {}
         for column, name in enumerate(names):
             columns.setdefault(name, column)
-        found = (self._follow(index, joint, columns) for index, joint in enumerate(self._joints))
-        return [joint for joint in found if joint is not None]
+        positions = (
+            self._follow(index, joint, columns) for index, joint in enumerate(self._joints)
+        )
+        return [joint for joint in positions if joint is not None]
 
     def _follow(self, index: int, joint: PlanJoint, columns: dict[str, int]) -> Followed | None:
         multiplier, offset, name = 1.0, 0.0, joint.name

@@ -1,6 +1,6 @@
-"""Stand-in for an owner: its edges or joint states, at the plan's rate and by its clock.
+"""Simulated owner: publishes edges or joint states at the plan's rate and by the plan's clock.
 
-The simulated motions are pure functions, in seconds, metres and radians.
+The simulated motions are pure functions in seconds, metres and radians.
 """
 
 from __future__ import annotations
@@ -22,46 +22,48 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.signals import Stop
     from tfcompose.model.plan import PlanJoint, Simulation, Sweep
-    from tfcompose.tf.process import Own
+    from tfcompose.tf.process import OwnProcess
 
 _SECOND_NS = 1_000_000_000
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run the process that PLAN_FILE PROCESS_NAME names, and return the exit code."""
+    """Run the process with arguments PLAN_FILE PROCESS_NAME, and return the exit code."""
     return start(argv, "simulate", simulate)
 
 
-def simulate(own: Own, stop: Stop) -> None:
+def simulate(own_process: OwnProcess, stop: Stop) -> None:
     """Publish the simulated edges, or joint states, at the plan's rate."""
-    simulation = own.process.simulate
-    if simulation is None:  # process.read_own has refused such a plan
+    simulation = own_process.process.simulate
+    if simulation is None:  # process.read_own rejects such a plan
         return
     from tfcompose.tf.ros.node import open_node  # noqa: PLC0415 (ROS, once signals are handled)
 
-    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
+    with open_node(
+        own_process.node_name, own_process.namespace, args=own_process.ros_args
+    ) as node:
         if simulation.kind == "joints":
-            publish, what = _joint_states(own, node, simulation)
+            publish, what = _joint_states(own_process, node, simulation)
         else:
-            publish, what = _body(own, node, simulation)
+            publish, what = _body(own_process, node, simulation)
         if not wait_for_go(stop):
             return
         say(f"{what}, simulated at {simulation.rate:g} Hz")
         ready()
-        if own.plan.ros.clock == "sim":
+        if own_process.plan.ros.clock == "sim":
             ticks = _sim_ticks(node, simulation.rate, stop)
         else:
-            ticks = _wall_ticks(simulation.rate, stop)
+            ticks = wall_ticks(simulation.rate, stop)
         for time_s, stamp_ns in ticks:
             publish(time_s, stamp_ns)
 
 
 def _body(
-    own: Own, node: Node, simulation: Simulation
+    own_process: OwnProcess, node: Node, simulation: Simulation
 ) -> tuple[Callable[[float, int], None], str]:
     from tfcompose.tf.ros.node import TFPublisher  # noqa: PLC0415 (ROS, once signals are handled)
 
-    edges = own.edges
+    edges = own_process.edges
     template = Template([(edge.parent, edge.child) for edge in edges])
     publisher = TFPublisher(node, static=False)
 
@@ -78,12 +80,12 @@ def _body(
 
 
 def _joint_states(
-    own: Own, node: Node, simulation: Simulation
+    own_process: OwnProcess, node: Node, simulation: Simulation
 ) -> tuple[Callable[[float, int], None], str]:
-    # Numpy: most stand-ins do without.
+    # It imports numpy, which most simulated owners do not need.
     from tfcompose.tf.ros.sensor_data import JointStatePublisher  # noqa: PLC0415
 
-    source = JointSource(simulation, [edge.joint for edge in own.plan.edges if edge.joint])
+    source = JointSource(simulation, [edge.joint for edge in own_process.plan.edges if edge.joint])
     publisher = JointStatePublisher(node, source.names)
 
     def publish(time_s: float, stamp_ns: int) -> None:
@@ -92,7 +94,7 @@ def _joint_states(
     return publish, f"{plural(len(source.names), 'joint')} on {publisher.topic}"
 
 
-def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
+def wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
     """Yield seconds since the start and the time to stamp with, at ``rate``; skip missed ticks."""
     start, tick = time.monotonic(), 0
     while not stop.wait(max(0.0, start + tick / rate - time.monotonic())):
@@ -102,7 +104,10 @@ def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
 
 
 def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
-    """Yield the same by /clock: nothing while it is paused, a new start when it jumps back."""
+    """Yield the same values as ``_wall_ticks``, by /clock.
+
+    Nothing is yielded while /clock is paused. A jump back starts again at 0 seconds.
+    """
     # ROS, once signals are handled.
     from tfcompose.tf.ros.clock import CLOCK_AFTER_S, SimClock, no_clock  # noqa: PLC0415
     from tfcompose.tf.ros.node import wait  # noqa: PLC0415 (ROS, once signals are handled)
@@ -129,39 +134,41 @@ def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int
 
 
 class JointSource:
-    """The simulated joints and their mimics, also through chains.
+    """The simulated joints and the joints that mimic them, including chains.
 
-    robot_state_publisher follows a chain of mimics only in the order of the names, so mimics are
-    sent with their own values.
+    robot_state_publisher follows a chain of mimicking joints only in the order of the names, so
+    the joint states contain the positions of mimicking joints.
     """
 
     def __init__(self, simulation: Simulation, joints: Sequence[PlanJoint]) -> None:
-        own = list(simulation.joints)
+        joint_names = list(simulation.joints)
         self._moves = [
             (start, simulation.sweep.get(name)) for name, start in simulation.joints.items()
         ]
         movable = [joint for joint in joints if joint.type in TURNING + SLIDING]
-        followed = {movable[joint.joint].name: joint for joint in Joints(movable).follow(own)}
+        followed = {
+            movable[joint.joint].name: joint for joint in Joints(movable).follow(joint_names)
+        }
         self._mimics = [joint for name, joint in followed.items() if name not in simulation.joints]
         #: The names, in the order of the positions.
-        self.names = own + [name for name in followed if name not in simulation.joints]
+        self.names = joint_names + [name for name in followed if name not in simulation.joints]
 
     def positions(self, time_s: float) -> list[float]:
-        """Return the positions ``time_s`` after the start: rad, or m for prismatic joints."""
-        own = [start for start, _ in self._moves]
+        """Return the positions ``time_s`` seconds after the start, in rad, or m if prismatic."""
+        positions = [start for start, _ in self._moves]
         for index, (rest, sweep) in enumerate(self._moves):
             if sweep:
-                own[index] = swept(sweep, rest, time_s)
-        return own + [
-            mimic.multiplier * own[mimic.column] + mimic.offset for mimic in self._mimics
+                positions[index] = swept(sweep, rest, time_s)
+        return positions + [
+            mimic.multiplier * positions[mimic.column] + mimic.offset for mimic in self._mimics
         ]
 
 
 def circle(radius: float, speed: float, time_s: float) -> Pose:
-    """Return the pose, in the circle's centre, of a body that drives on it.
+    """Return the pose of a body that drives on a circle, relative to the circle's centre.
 
-    x = r cos ωt, y = r sin ωt. ``radius`` is r in metres, ``speed`` is ω in rad/s,
-    counter-clockwise if positive. The body faces its direction of travel.
+    x = r cos ωt, y = r sin ωt. ``radius`` is r in metres. ``speed`` is ω in rad/s, positive
+    counter-clockwise. The body faces its direction of travel.
     """
     angle = speed * time_s
     heading = angle + math.copysign(math.pi / 2, speed)
@@ -171,11 +178,11 @@ def circle(radius: float, speed: float, time_s: float) -> Pose:
 
 
 def swept(sweep: Sweep, start: float, time_s: float) -> float:
-    """Return the position (rad or m) of a joint that sweeps from ``start`` at time 0.
+    """Return the position, in rad or m, of a joint that sweeps from ``start`` at time 0.
 
-    Back and forth is a sine about the middle, upwards at first: position and speed have no steps,
-    and the speed is at most π · (upper - lower) / period. A continuous rotation keeps the angle
-    between -π and π.
+    A sweep between limits is a sine about the middle and first moves upwards. Position and speed
+    have no steps, and the speed is at most π · (upper - lower) / period. For a continuous
+    rotation, the angle stays between -π and π.
     """
     phase = math.tau * time_s / sweep.period_s
     if sweep.lower is None or sweep.upper is None:

@@ -1,9 +1,9 @@
-"""The plan: which processes are started, and which TF edge each of them owns.
+"""The plan: the processes to start, and the TF edges that each of them owns.
 
-It is the border between the compiler and everything that runs on a robot; ``file`` writes and
-reads plan.json. Poses are the pose of the child in the parent, in metres with unit quaternions x,
-y, z, w; rates are hertz, times seconds. Enumerations are ``Literal``, for the language and the
-messages too.
+The plan is the border between the compiler and all programs that run on a robot. ``file`` writes
+and reads plan.json. A pose is the pose of the child in the parent, in metres, with a unit
+quaternion x, y, z, w. Rates are in Hz and times in seconds. Enumerations are ``Literal`` types,
+which the language and messages also use.
 """
 
 from tfcompose.model.plan.plan import (

@@ -1,8 +1,8 @@
 """Load requests for component containers, shared by the launcher and the guard.
 
-Names are those of rclcpp_components (ROS 2 Jazzy): a container offers ``~/_container/load_node``
-and others beside it. A component takes nothing from the container's command line, so that its
-remappings and parameters go with the request.
+Names are those of rclcpp_components (ROS 2 Jazzy). A container offers the service
+``~/_container/load_node`` and similar services. A component ignores the container's command line,
+so the request contains its remappings and parameters.
 """
 
 from __future__ import annotations
@@ -20,19 +20,20 @@ if TYPE_CHECKING:
 
     from tfcompose.model.plan import Plan, PlanProcess
 
-#: The services, below the container's node.
+#: Services of a container, relative to its node.
 LOAD, UNLOAD, LIST = "_container/load_node", "_container/unload_node", "_container/list_nodes"
 
 
-#: In JSON, the key of a number that is infinite or none.
+#: The JSON key for a number that is infinite or not a number.
 _DOUBLE = "double"
 
 
 @dataclass(frozen=True, slots=True)
 class LoadRequest:
-    """A component to load, with values of parameters as ROS has them.
+    """A component to load, with the values of its parameters as in ROS.
 
-    A list has values of one kind; a list of whole and other numbers counts as one of others.
+    A list has values of a single type. A list of integers and other numbers counts as a list of
+    doubles.
     """
 
     #: The full name of the container's node.
@@ -44,12 +45,12 @@ class LoadRequest:
 
     @property
     def what(self) -> str:
-        """The component as people write it."""
+        """The component for display: package/plugin."""
         return f"{self.component.package}/{self.component.plugin}"
 
 
 def load_file(folder: Path, process: str) -> Path:
-    """Return the file, in the folder of a run's plan, that holds a component's request."""
+    """Return the file for a component's request, in the folder of a run's plan."""
     return folder / "load" / f"{process.replace('/', '.')}.json"
 
 
@@ -58,12 +59,11 @@ def load_request(
 ) -> LoadRequest:
     """Return the request for a component of the plan.
 
-    ``fill`` replaces what only the starting machine knows.
-
-    With ``private`` the processes of a strict plan are remapped to TF topics of their own.
+    ``fill`` replaces placeholders for values that only the starting machine knows. With
+    ``private``, remappings isolate the processes of a strict plan on separate TF topics.
 
     Raises:
-        ValueError: if the process is no component, or its container has no node.
+        ValueError: if the process is not a component, or its container has no node.
     """
     component = process.component
     container = next(
@@ -77,8 +77,10 @@ def load_request(
     if component is None or container is None or not container.nodes or not process.nodes:
         raise ValueError(f"the plan does not say which container loads {process.name}")
     remap = process.remap
-    if private and (own := private_topics(plan).get(process.name)):
-        remap = dict([*zip(GLOBAL, own, strict=True), *zip(process.topics, own, strict=True)])
+    if private and (topics := private_topics(plan).get(process.name)):
+        remap = dict(
+            [*zip(GLOBAL, topics, strict=True), *zip(process.topics, topics, strict=True)]
+        )
         remap |= {old: new for old, new in process.remap.items() if old not in remap}
     params = {name: _fill(value, fill) for name, value in component.params.items()}
     loaded = replace(component, params=params)
@@ -86,7 +88,7 @@ def load_request(
 
 
 def json_value(value: Any) -> Any:
-    """Return a parameter's value as JSON has it, which has no infinite numbers."""
+    """Return a parameter's value for JSON, which has no infinite numbers."""
     if isinstance(value, list):
         return [json_value(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
@@ -95,7 +97,7 @@ def json_value(value: Any) -> Any:
 
 
 def ros_value(value: Any) -> Any:
-    """Return the value of a parameter that ``json_value`` made."""
+    """Return the original value of a result of ``json_value``."""
     if isinstance(value, list):
         return [ros_value(item) for item in value]
     return float(value[_DOUBLE]) if isinstance(value, dict) else value

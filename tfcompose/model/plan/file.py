@@ -1,4 +1,4 @@
-"""The plan as a file: JSON, in which fields at their defaults are left out."""
+"""The plan as a JSON file, in which fields with default values are left out."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from tfcompose.model.plan import VERSION, Plan
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: A robot's name, which becomes part of topics, units and programs; and a process's, in a part
-#: with the part's name.
+#: A robot's name, which becomes part of topics, systemd units and programs; and a process's name,
+#: which includes the part's name for a process of a part.
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
-#: A host's, which becomes part of folders, units and nodes.
+#: A host's name, which becomes part of folders, systemd units and nodes.
 _HOST = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
-#: Control characters, and halves of characters.
+#: Control characters, and unpaired surrogates.
 _CONTROL = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
-#: What was written is normalised to the last bit.
+#: Tolerance for the length of a quaternion. Written quaternions are normalised to the last bit.
 _UNIT = 1e-6
-#: So much of a value is shown in an error, in characters.
+#: Maximum number of characters of a value, and of a quoted value, in an error.
 _LONGEST_SHOWN, _LONGEST_QUOTED = 60, 100
 _BYTE = re.compile(r"\(byte (\d+)\)")
-#: Keys below which text may hold lines and tabs: what programs are given.
+#: Keys below which text may contain line breaks and tabs, because programs receive it.
 _FOR_PROGRAMS = frozenset({"argv", "env", "switches", "component"})
 
 
 def write_plan(plan: Plan) -> str:
     """Return the plan as JSON text.
 
-    One line an edge and a process, the same bytes for the same plan.
+    Each edge and each process has its own line. The same plan always gives the same bytes.
     """
     lines = []
     for key, value in ({"version": VERSION} | _data(plan)).items():
@@ -49,7 +49,7 @@ def write_plan(plan: Plan) -> str:
 
 
 def _data(value: Any) -> Any:
-    """Return a value of a plan as JSON has it."""
+    """Return a value of a plan as JSON data."""
     if is_dataclass(value):
         held = {field: getattr(value, field.name) for field in fields(value)}
         return {field.name: _data(part) for field, part in held.items() if part != _default(field)}
@@ -66,7 +66,7 @@ def read_plan(text: str, file: str) -> Plan:
     """Return the plan that ``write_plan`` wrote.
 
     Raises:
-        RejectedError: with a TF902 finding, if the text is no plan of this version.
+        RejectedError: with a TF902 finding, if the text is not a plan of this version.
     """
     try:
         data = msgspec.json.decode(text)
@@ -91,7 +91,10 @@ def read_plan(text: str, file: str) -> Plan:
 
 
 def _place(error: Exception, text: str, file: str) -> Span:
-    """Return where msgspec found that a text is no JSON: its message holds the byte."""
+    """Return the place where the text stops being JSON.
+
+    msgspec's message contains its byte offset.
+    """
     byte = _BYTE.search(str(error))
     lines = (
         text.encode(errors="replace")[: int(byte[1])].decode(errors="replace").split("\n")
@@ -102,19 +105,27 @@ def _place(error: Exception, text: str, file: str) -> Span:
     return Span(file, line, column, line, column + 1)
 
 
-def _wrong_text(data: Any) -> Iterator[str]:
-    """Yield what is wrong with each text.
+def has_refused_character(text: str, *, is_for_program: bool) -> bool:
+    """Return whether a plan with this text is refused for a control character.
 
-    Control characters would move a terminal's cursor, or begin a new line.
+    Lines and tabs may be in a text for a program.
+    """
+    characters = set(_CONTROL.findall(text))
+    return bool(characters - {"\n", "\t"} if is_for_program else characters)
+
+
+def _wrong_text(data: Any) -> Iterator[str]:
+    """Yield faults of texts, which must not contain control characters.
+
+    Control characters would move a terminal's cursor or begin a new line.
     """
     waiting: list[tuple[Any, tuple[str, ...]]] = [
         (data, ())
-    ]  # what no field takes may be nested deeper than calls may
+    ]  # unknown data may be nested too deep for recursion
     while waiting:
         value, path = waiting.pop()
         if isinstance(value, str):
-            found = _CONTROL.findall(value)
-            if found and not (_FOR_PROGRAMS & set(path) and {"\n", "\t"}.issuperset(found)):
+            if has_refused_character(value, is_for_program=bool(_FOR_PROGRAMS & {*path})):
                 yield f"{'.'.join(path)} holds a control character: {json.dumps(value)[:60]}"
         elif isinstance(value, dict):
             for key, item in reversed(value.items()):
@@ -126,14 +137,14 @@ def _wrong_text(data: Any) -> Iterator[str]:
 
 
 def _wrong_names(plan: Plan) -> Iterator[str]:
-    """Yield what is wrong with names.
+    """Yield faults of names.
 
-    Those that no robot file can give, of nothing, and of files elsewhere.
+    Names that no robot file can have, unknown names, and outside files.
     """
     if not _ROBOT.fullmatch(plan.robot):
         yield f"robot is {_shorten(plan.robot)}, not a name of lower case letters, digits and _"
-    known = Counter(process.name for process in plan.processes)
-    for name, times in known.items():
+    counts = Counter(process.name for process in plan.processes)
+    for name, times in counts.items():
         if not _PROCESS.fullmatch(name):
             yield f"a process is named {_shorten(name)}, not with letters, digits, _, - and ."
         if times > 1:
@@ -141,15 +152,15 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
     yield from (
         f"the owner of {edge.name} is {_shorten(edge.owner)}, which is not a process"
         for edge in plan.edges
-        if edge.owner not in known
+        if edge.owner not in counts
     )
     yield from (
-        f"{process.name} waits for {_shorten(other)}, which is not a process"
+        f"{process.name} waits for {_shorten(awaited)}, which is not a process"
         for process in plan.processes
-        for other in process.after
-        if other not in known
+        for awaited in process.after
+        if awaited not in counts
     )
-    if all(other in known for process in plan.processes for other in process.after):
+    if all(awaited in counts for process in plan.processes for awaited in process.after):
         yield from _wrong_order(plan)
     for ready, name in ((process.ready, process.name) for process in plan.processes):
         if ready and ready.kind == "log" and (error := _regex_error(ready.text)):
@@ -172,7 +183,7 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
 
 
 def _wrong_components(plan: Plan) -> Iterator[str]:
-    """Yield what is wrong with components: their containers must be processes with a node."""
+    """Yield faults of components: each container must be a process with a node."""
     containers = {
         process.name for process in plan.processes if process.nodes and not process.component
     }
@@ -217,7 +228,7 @@ def _wrong_files(plan: Plan) -> Iterator[str]:
 
 
 def _wrong_hosts(plan: Plan) -> Iterator[str]:
-    """Yield the hosts whose names cannot be part of folders and units."""
+    """Yield hosts whose names cannot be part of folders and systemd units."""
     return (name for name in plan.hosts if not _HOST.fullmatch(name))
 
 
@@ -234,17 +245,17 @@ def _bad(message: str, span: Span) -> Finding:
 
 
 def _short(error: msgspec.ValidationError) -> str:
-    """Return what msgspec says, without most of a long value that is quoted in it."""
-    what, at, place = str(error).rpartition(" - at ")
+    """Return msgspec's message, with long quoted values shortened."""
+    what, separator, place = str(error).rpartition(" - at ")
     return (
-        f"{what}{at}{place}"
+        f"{what}{separator}{place}"
         if len(what) <= _LONGEST_QUOTED
-        else f"{what[:_LONGEST_QUOTED]}…{at}{place}"
+        else f"{what[:_LONGEST_QUOTED]}…{separator}{place}"
     )
 
 
 def _shorten(value: Any) -> str:
-    """Return a value that was read as an error shows it, shortened."""
+    """Return a value as an error shows it, shortened."""
     text = _json(value)
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
 

@@ -1,8 +1,8 @@
-"""A plan over several machines: which of them this one is, and what it starts.
+"""A plan for several machines: which of them this machine is, and what it starts.
 
-A process runs on the host that it names. What names none runs on the machine that the plan does
-not name; where ``static`` names a host, the compiler has written that host to all of them. The
-guard runs on every machine.
+A process runs on the host that it names. If ``static`` names a host, the compiler has set this
+host for all processes without a host. Otherwise, processes without a host run on a machine that
+the plan does not name. The guard runs on every machine.
 """
 
 from __future__ import annotations
@@ -16,38 +16,40 @@ from tfcompose.model.plan import PlanProcess, Ready
 if TYPE_CHECKING:
     from tfcompose.model.plan import Plan, PlanEdge
 
-#: What a launcher cannot see of a process on another machine: its output and its end.
+#: Readiness checks that are impossible for a process on another machine.
 _UNSEEN = ("log", "exit")
 
 
 def hosts_of(plan: Plan) -> tuple[str, ...]:
-    """Return the machines that the plan names, in its order."""
+    """Return the machines that the plan names, in order."""
     named = (process.host for process in plan.managed)
     return tuple(dict.fromkeys(host for host in named if host is not None))
 
 
 def without_host(plan: Plan) -> tuple[str, ...]:
-    """Return what the machine starts that the plan does not name."""
-    own = (process for process in plan.processes if process.kind not in ("external", "guard"))
-    return tuple(process.name for process in own if process.host is None)
+    """Return the processes that the unnamed machine starts."""
+    processes = (
+        process for process in plan.processes if process.kind not in ("external", "guard")
+    )
+    return tuple(process.name for process in processes if process.host is None)
 
 
 def share_of(plan: Plan, host: str | None, machine: str) -> Plan | Finding:
-    """Return the plan as one machine starts it: what others start is expected there, not started.
+    """Return the share of the plan that a machine starts. Processes of others become external.
 
-    ``host`` is the one that the user says this is; without it, it is the one with this
-    ``machine``'s name, whole or up to the first dot, or else the one that the plan does not name.
-    A plan without hosts stays as it is.
+    ``host`` is the user's choice. By default, it is the host with the name ``machine``, either the
+    full name or the part before the first dot; otherwise, the machine that the plan does not name.
+    A plan without hosts is returned unchanged.
     """
     hosts = hosts_of(plan)
     if host is not None and host not in hosts:
-        known = (
+        advice = (
             f"the plan names {', '.join(hosts)}"
             if hosts
             else "the plan names no host: leave out --host"
         )
         message = f"no process of {plan.robot} runs on a host named {host}"
-        return finding("TF819", message, None, help=f"{did_you_mean(host, hosts, known)}")
+        return finding("TF819", message, None, help=f"{did_you_mean(host, hosts, advice)}")
     if not hosts:
         return plan
     watched = next((process.host for process in plan.processes if process.kind == "guard"), None)
@@ -74,23 +76,23 @@ def share_of(plan: Plan, host: str | None, machine: str) -> Plan | Finding:
 
 
 def describe_share(plan: Plan) -> tuple[str, ...]:
-    """Return what is printed of a share: what this machine starts, and what others do.
+    """Return lines about a share: what this machine starts, and what other machines start.
 
-    Nothing of a whole plan.
+    Empty for a complete plan.
     """
     if plan.host is None:
         return ()
-    others: dict[str, list[str]] = {}
+    names_by_place: dict[str, list[str]] = {}
     for process in plan.processes:
         if process.kind == "external":
-            others.setdefault(
+            names_by_place.setdefault(
                 f"of {process.host}" if process.host else "from elsewhere", []
             ).append(process.name)
-    own = ", ".join(process.name for process in plan.managed)
+    names = ", ".join(process.name for process in plan.managed)
     here = f"host {plan.host}" if plan.host else "this machine, which the plan does not name,"
     return (
-        f"{here} starts {own}",
-        *(f"expected {where}: {', '.join(names)}" for where, names in others.items()),
+        f"{here} starts {names}",
+        *(f"expected {where}: {', '.join(names)}" for where, names in names_by_place.items()),
     )
 
 
@@ -107,10 +109,11 @@ def _share(plan: Plan, host: str | None) -> Plan:
 
 
 def with_guard_alone(plan: Plan) -> Plan:
-    """Return the plan of a robot that others start: each process but the guard is external.
+    """Return the plan with every process external except the guard.
 
-    The static publisher is left out if it has no edge. A guard cannot hold back what others start,
-    so that a strict one watches.
+    This is for a robot that another program starts. The static publisher is left out if it has no
+    edge. A guard cannot block processes that another program starts, so a strict guard only
+    watches.
     """
     processes = []
     for process in plan.processes:
@@ -123,9 +126,9 @@ def with_guard_alone(plan: Plan) -> Plan:
 
 
 def _edge_on_host(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:
-    """Return the edge as it is seen on a host.
+    """Return the edge as this host observes it.
 
-    What another machine's process sends, its strict guard passes on.
+    The strict guard of another machine forwards the edges of that machine's processes.
     """
     owner = plan.process(edge.owner)
     if owner.kind == "external" or owner.host == host:
@@ -140,7 +143,7 @@ def _here(plan: Plan, process: PlanProcess, host: str | None) -> PlanProcess:
 
 
 def _elsewhere(process: PlanProcess) -> PlanProcess:
-    """Return the process as one that is expected: how it is run is its own machine's business."""
+    """Return the process as an external process, without the settings for its start."""
     ready, states = process.ready, set(process.lifecycle.values())
     if ready and ready.kind in _UNSEEN:
         ready = None
@@ -163,5 +166,5 @@ def _elsewhere(process: PlanProcess) -> PlanProcess:
 
 def without_computer(plan: Plan) -> tuple[str, ...]:
     """Return the processes that no computer under ``hosts`` would run."""
-    own = (process for process in plan.managed if process.kind != "guard")
-    return tuple(process.name for process in own if process.host not in plan.hosts)
+    processes = (process for process in plan.managed if process.kind != "guard")
+    return tuple(process.name for process in processes if process.host not in plan.hosts)

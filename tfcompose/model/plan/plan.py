@@ -1,6 +1,7 @@
 """Contents of a plan: enumerations, edges, processes, shared settings, guard policy.
 
-Each enumeration of the plan and of the language is a Literal here; ``get_args`` gives its words.
+Each enumeration of the plan and the language is a Literal in this module. ``get_args`` returns its
+values.
 """
 
 from __future__ import annotations
@@ -13,87 +14,88 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from msgspec import Meta
 
-from tfcompose.foundation.geometry import Pose
+from tfcompose.foundation.geometry import Offset, Pose, offset_of
 from tfcompose.model.fields import documented_field
 
-#: Who moves an edge: nobody, joint states, or its owner.
+#: What moves an edge: nothing, joint states, or its owner.
 EdgeKind = Literal["static", "joint", "dynamic"]
-#: How a joint moves; of planar and floating ones joint states say nothing.
+#: Type of a moving joint. Joint states do not describe planar and floating joints.
 JointType = Literal["revolute", "continuous", "prismatic", "planar", "floating"]
 
-#: What a process is: one of tfcompose's own, one that is started elsewhere, a program, or a node
-#: in a container.
+#: Kind of a process: a process of tfcompose, a process started elsewhere, a program, or a node in
+#: a container.
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run", "component"]
-#: After which ends a process is started again.
+#: Exits after which a process is restarted.
 RestartPolicy = Literal["no", "on-failure", "always"]
-#: The first signal that ends a process.
+#: The first signal that stops a process.
 StopSignal = Literal["SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", "SIGUSR2"]
-#: What makes a process ready.
+#: Condition for the readiness of a process.
 ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "time"]
-#: What must have happened to another process before one is started.
+#: State that another process must reach before a process starts.
 StartCondition = Literal["started", "ready", "done"]
-#: The states of a lifecycle node that it can be brought into, or be waited for in.
+#: States of a lifecycle node that the guard can wait for or bring the node into.
 LifecycleState = Literal["inactive", "active"]
-#: How much a node's loggers write.
+#: Level of a node's loggers.
 LogLevel = Literal["debug", "info", "warn", "error", "fatal"]
-#: What a stand-in does.
+#: Kind of simulation.
 SimulationKind = Literal["circle", "fixed", "joints"]
-#: Where a process's output goes: to the terminal of up and into its log, or to one of them.
+#: Destination of a process's output: the terminal of ``up``, the log, or both.
 OutputPlace = Literal["both", "log", "screen"]
-#: How the kernel schedules a process (sched(7)); fifo and rr are real-time policies.
+#: Kernel scheduling policy (sched(7)). fifo and rr are real-time policies.
 SchedulingPolicy = Literal["other", "batch", "idle", "fifo", "rr"]
-#: How well the pose of a frame is known that a driver publishes.
+#: Precision of the preset's pose for a frame that a driver publishes.
 PoseKnowledge = Literal["exact", "nominal", "unknown"]
 
-#: Whose time the whole plan runs by.
+#: The clock of the plan.
 Clock = Literal["wall", "sim"]
-#: How far ROS looks for other nodes; None in a plan: as far as the environment says.
+#: Range of ROS's discovery. None in a plan means the environment's setting.
 Discovery = Literal["localhost", "subnet", "off"]
-#: The middleware that all processes use.
+#: The middleware of all processes.
 Rmw = Literal["fastdds", "cyclonedds", "zenoh"]
-#: The release of ROS that all processes are from.
+#: The ROS release of all processes.
 Distro = Literal["jazzy", "kilted"]
-#: What keeps several robots in one domain apart: topics below their namespaces, or frames with a
-#: prefix.
+#: How robots in a ROS domain are isolated: topics below namespaces, or frames with a prefix.
 Isolation = Literal["none", "topics", "frames", "both"]
-#: Who publishes what is ours below the base.
+#: The publisher of tfcompose's edges below the base.
 StatePublisher = Literal["tfcompose", "stock"]
-#: Who publishes the frames inside a sensor.
+#: The publisher of the frames inside a sensor.
 SensorPublisher = Literal["driver", "tfcompose"]
 
-#: What the guard does with what a process sends and does not own: nothing, report it, or hold it
-#: back.
+#: What the guard does about an edge from a process that does not own it: nothing, report it, or
+#: block it.
 GuardMode = Literal["off", "watch", "strict"]
-#: What an edge is that nobody declared.
+#: Severity of an undeclared edge.
 UnknownEdges = Literal["ignore", "warn", "error"]
-#: What follows a violation: words, the end of the process that surely did it, or the end of
-#: everything.
+#: Reaction to a violation: report it, stop the process that certainly caused it, or stop the
+#: robot.
 OnViolation = Literal["report", "stop-offender", "stop"]
-#: How a strict guard fences processes off; auto: by partition where their rmw is Fast DDS, else by
+#: How a strict guard isolates processes. ``auto`` uses a partition for Fast DDS, otherwise
 #: remapping.
 FenceWay = Literal["auto", "partition", "remap"]
 
 
-#: An edge is silent after four periods, and never before this: what a loaded machine can delay.
+#: An edge is silent after four periods, but not before this time in seconds, which allows for
+#: delays on a loaded machine.
 _SILENT_AT_LEAST_S = 0.6
 _SILENT_PERIODS = 4.0
-#: It is too slow below this part of the rate that is declared, and from then on up to that one.
+#: An edge becomes slow below the first fraction of its declared rate, and stays slow up to the
+#: second.
 _SLOW_BELOW, _SLOW_UP_TO = 0.8, 0.9
-#: How often a process is started again in a row, unless it says so itself.
+#: Default limit for consecutive restarts of a process.
 MAX_RESTARTS = 5
 
 
 def silent_after_s(period_s: float) -> float:
-    """Return how long an edge that comes every ``period_s`` seconds may be quiet."""
+    """Return how long an edge with this period may be silent, in seconds."""
     return max(_SILENT_AT_LEAST_S, _SILENT_PERIODS * period_s)
 
 
-#: A time or rate.
+#: A time or a rate.
 AboveZero = Annotated[float, Meta(gt=0)]
 
 
 class SourceLine(NamedTuple):
-    """A line of a robot file; the file is relative to the robot's."""
+    """A line of a robot file. ``file`` is relative to the folder of the main robot file."""
 
     file: str
     line: int
@@ -111,57 +113,66 @@ class EdgePattern:
 
 @dataclass(frozen=True, slots=True)
 class PlanJoint:
-    """A moving joint: motion along an axis, on top of the edge's pose."""
+    """A moving joint: a motion along or about an axis, after the edge's pose."""
 
     name: str
     type: JointType
     #: A unit vector in the child's frame at q = 0.
     axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    #: The joint that it follows: its position is ``multiplier`` · q(mimic) + ``offset``.
+    #: The joint that it mimics. Its position is ``multiplier`` · q(mimic) + ``offset``.
     mimic: str | None = None
     multiplier: float = 1.0
-    #: In radians; in metres for a prismatic joint.
+    #: In rad, or in m for a prismatic joint.
     offset: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PlanEdge:
-    """One TF edge and the process that publishes it."""
+    """A TF edge and the process that publishes it."""
 
-    #: The nominal parent of a child that changes parents.
+    #: The parent; for a child that changes parents, the nominal parent.
     parent: str
     child: str
     kind: EdgeKind
     owner: str
     #: The full name of the publishing node.
     node: str
-    #: The identity where ``pose_known`` is False.
+    #: The pose of the child in the parent; the identity if ``pose_known`` is False.
     pose: Pose
-    #: In hertz; None: the plan does not say.
+    #: Rate in Hz, None if the plan states none.
     rate: float | None
     source: SourceLine
     joint: PlanJoint | None = None
-    #: The other parents that the owner may attach the child to.
+    #: Other parents to which the owner may attach the child.
     switched: tuple[str, ...] = ()
     #: False if only the owner knows the child's pose.
     pose_known: bool = True
+    #: The sensor that it mounts; empty: none.
+    mounts: str = ""
+    #: The poses before each adjustment on the running robot, the built one first.
+    earlier: tuple[Pose, ...] = ()
 
     @property
     def name(self) -> str:
-        """The edge as people read it."""
+        """The edge for display."""
         return f"{self.parent} → {self.child}"
 
     @property
+    def adjustment(self) -> Offset | None:
+        """How far an adjusted pose is from the built one; None if nothing adjusted it."""
+        return offset_of(self.earlier[0], self.pose) if self.earlier else None
+
+    @property
     def silent_after_s(self) -> float | None:
-        """How long a moving edge may be quiet, in seconds, or None if it says no rate."""
+        """How long a moving edge may be silent, in seconds, None without a rate."""
         if not self.rate or self.kind == "static":
             return None
         return silent_after_s(1 / self.rate)
 
     def is_slow(self, rate: float, speed: float, *, was_slow: bool = False) -> bool:
-        """Return whether it comes too seldom, at ``rate`` in hertz.
+        """Return whether the edge arrives too rarely at ``rate`` Hz.
 
-        Time goes by ``speed`` times as fast as the time of day, as in a simulation.
+        ``speed`` is the real-time factor of the clock, as in a simulation.
         """
         share = _SLOW_UP_TO if was_slow else _SLOW_BELOW
         return rate < share * speed * (self.rate or 0.0)
@@ -171,21 +182,22 @@ class PlanEdge:
         return parent == self.parent or parent in self.switched
 
 
-#: In an ``argv``, ``${plan}``, ``${build_dir}`` and ``${params_file}`` stand for what only the
-#: starting machine knows. As its first word ``${tfcompose}`` is this program,
-#: ``${executable:PACKAGE/NAME}`` a package's, and ``${launch:PACKAGE/FILE}`` a package's launch
-#: file; the words after that are the launch file's arguments, ``name:=value``.
+#: Placeholders in an ``argv``. ``${plan}``, ``${build_dir}`` and ``${params_file}`` stand for
+#: paths that only the starting machine knows. The first word can be ``${tfcompose}`` for
+#: tfcompose, ``${executable:PACKAGE/NAME}`` for a program of a package, or
+#: ``${launch:PACKAGE/FILE}`` for a launch file of a package, which is followed by its arguments,
+#: ``name:=value``.
 PROGRAM = "${tfcompose}"
 _AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """Motion of a simulated joint: between two positions, or without them in full turns."""
+    """Motion of a simulated joint between two positions, or in full turns without positions."""
 
-    #: The time there and back, or of a full turn.
+    #: Duration of a motion to the other end and back, or of a full turn.
     period_s: AboveZero
-    #: In radians, or metres for a prismatic joint.
+    #: Lower end in rad, or in m for a prismatic joint.
     lower: float | None = None
     upper: float | None = None
 
@@ -196,14 +208,14 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A simulation of an owner: a body on a circle, one at rest, or joint states."""
+    """A simulation of an owner: a body on a circle, a body at rest, or joint states."""
 
     kind: SimulationKind
-    #: In hertz.
+    #: Rate in Hz.
     rate: AboveZero
     radius: float = 0.0
     speed: float = 0.0
-    #: Initial positions (rad or m); joints without a ``sweep`` stay there.
+    #: Initial positions in rad or m. Joints without a ``sweep`` stay there.
     joints: dict[str, float] = field(default_factory=dict)
     sweep: dict[str, Sweep] = field(default_factory=dict)
     pose: Pose = field(default_factory=Pose)
@@ -225,12 +237,12 @@ class Ready:
 
 @dataclass(frozen=True, slots=True)
 class StopRule:
-    """The signals that end a process, and the time between them."""
+    """The signals that stop a process, and the time between them."""
 
     signal: StopSignal = "SIGINT"
-    #: From a signal to the next one; None: the launcher's default.
+    #: Time from a signal to the next signal, None for the launcher's default.
     timeout_s: float | None = None
-    #: From SIGTERM to SIGKILL; None: ``timeout_s``.
+    #: Time from SIGTERM to SIGKILL, None for ``timeout_s``.
     kill_timeout_s: float | None = None
 
 
@@ -238,15 +250,15 @@ class StopRule:
 class Schedule:
     """Kernel scheduling of a process."""
 
-    #: The processors that it may run on; empty: any.
+    #: CPUs that the process may use; empty for all.
     cpus: tuple[int, ...] = ()
     #: A policy of sched(7).
     policy: SchedulingPolicy = "other"
-    #: 1 to 99 with a real-time policy, else 0.
+    #: 1 to 99 for a real-time policy, otherwise 0.
     priority: int = 0
 
 
-#: A node's parameter that is not a list.
+#: The value of a node's parameter that is not a list.
 ParameterValue = str | int | float | bool
 
 
@@ -256,26 +268,25 @@ class Driven:
 
     sensor: str
     preset: str
-    #: True: the driver owns the frames inside the sensor.
+    #: Whether the driver owns the frames inside the sensor.
     publishes: bool
-    #: Parameters or arguments that keep the driver from publishing edges it does not own.
+    #: Parameters or arguments that stop the driver from publishing edges that it does not own.
     switch: dict[str, ParameterValue] = field(default_factory=dict)
-    #: Whether the pose of each frame that the driver publishes inside the sensor is exact, nominal
-    #: or unknown.
+    #: Precision of the pose of each frame that the driver publishes inside the sensor.
     frames: dict[str, PoseKnowledge] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """A node that a container loads; it has no process of its own in the operating system."""
+    """A node that a container loads. It has no process in the operating system."""
 
-    #: The process that loads it.
+    #: The process that loads the component.
     container: str
     package: str
     #: A class of ``package``.
     plugin: str
-    #: By full names, with dots. A value is a boolean, a number, a text or a list of one kind, as
-    #: ``components.json_value`` has them.
+    #: Parameters by full name, with dots. A value is a boolean, a number, a string or a list of
+    #: one of these types, in the form of ``components.json_value``.
     params: dict[str, Any] = field(default_factory=dict)
     #: Options for the container, such as ``use_intra_process_comms``.
     extra_arguments: dict[str, Any] = field(default_factory=dict)
@@ -283,7 +294,7 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class PlanProcess:
-    """A process to start, an ``external`` one to expect, or a ``component`` to load."""
+    """A process to start, an ``external`` process to expect, or a ``component`` to load."""
 
     name: str
     kind: ProcessKind
@@ -292,53 +303,54 @@ class PlanProcess:
     cwd: str | None = None
     params_file: str | None = None
     remap: dict[str, str] = field(default_factory=dict)
-    #: Full names.
+    #: Full names of the nodes.
     nodes: tuple[str, ...] = ()
     restart: RestartPolicy = "no"
     #: None: the launcher's default.
     max_restarts: int | None = None
-    #: True: the robot stops when the process exits; None: when it fails; False: never.
+    #: If True, the robot stops when the process exits; if None, when it fails; if False, never.
     required: bool | None = None
     stop: StopRule = field(default_factory=StopRule)
     log_level: LogLevel | None = None
-    #: The state that the guard brings a node to after the start.
+    #: The state into which the guard brings each node after the start.
     lifecycle: dict[str, LifecycleState] = field(default_factory=dict)
     after: dict[str, StartCondition] = field(default_factory=dict)
-    #: None: when the edges that it owns are live, or, without any, when it was started.
+    #: None: the process is ready when its edges are live; without edges, when it has started.
     ready: Ready | None = None
     host: str | None = None
     owns: tuple[tuple[str, str], ...] = ()
-    #: The file beside the plan that it sends as ``robot_description``; None: the plan's.
+    #: The file next to the plan that the process publishes as ``robot_description``, None for the
+    #: plan's.
     description: str | None = None
-    #: The sensors that it is the driver of, by their presets.
+    #: The sensors whose driver it is, by their presets.
     drives: tuple[Driven, ...] = ()
-    #: By full name of a node: its parameters that decide which TF it publishes.
+    #: Parameters that decide which TF a node publishes, by full name of the node.
     switches: dict[str, dict[str, ParameterValue]] = field(default_factory=dict)
-    #: The namespace of its nodes, without a leading slash; None: the plan's.
+    #: The namespace of its nodes, without a leading slash; None for the plan's.
     namespace: str | None = None
     simulate: Simulation | None = None
-    #: In seconds from its end; None: longer each time.
+    #: Delay from its end to the restart in seconds, None for increasing delays.
     restart_delay: float | None = None
     #: A wrapper command, such as gdb, valgrind or nice.
     prefix: tuple[str, ...] = ()
     schedule: Schedule | None = None
     component: Component | None = None
     output: OutputPlace = "both"
-    #: True: it writes to a pseudo-terminal.
+    #: Whether it writes to a pseudo-terminal.
     emulate_tty: bool = False
-    #: As in proc_pid_oom_score_adj(5); None: the launcher's.
+    #: As in proc_pid_oom_score_adj(5), None for the launcher's value.
     oom_score_adj: int | None = None
-    #: Soft and hard RLIMIT_NOFILE of getrlimit(2), None: the launcher's.
+    #: Soft and hard RLIMIT_NOFILE of getrlimit(2), None for the launcher's values.
     open_files: int | None = None
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """The texts in which places of files can stand: its command, variables and folder."""
+        """The texts that may contain paths: command line, environment variables and folder."""
         return (*self.argv, *self.env.values(), self.cwd or "")
 
     @property
     def is_state_publisher(self) -> bool:
-        """Whether it is ROS's own robot_state_publisher, which the plan starts."""
+        """Whether it is ROS's robot_state_publisher, started by the plan."""
         return self.argv[:1] == (_STATE_PUBLISHER,)
 
     @property
@@ -348,12 +360,12 @@ class PlanProcess:
 
     @property
     def restart_limit(self) -> int:
-        """How often it is started again in a row."""
+        """Maximum number of consecutive restarts."""
         return MAX_RESTARTS if self.max_restarts is None else self.max_restarts
 
 
 def is_known_at_launch(value: Any) -> bool:
-    """Return whether a value holds a path that only the launcher knows."""
+    """Return whether a value contains a path that only the launcher knows."""
     if isinstance(value, str):
         return bool(_AT_START.search(value))
     items = (
@@ -404,16 +416,16 @@ class RosSettings:
 
 @dataclass(frozen=True, slots=True)
 class PlanHost:
-    """A computer that processes run on, and the way to reach it."""
+    """A computer that runs processes, and how to reach it."""
 
     #: user@address, or a name in the ssh configuration.
     ssh: str
     port: int | None = None
-    #: The interpreter that runs tfcompose there: a program or its path.
+    #: The Python interpreter, by name or path, that runs tfcompose there.
     python: str | None = None
-    #: Files to source before it.
+    #: Files to source before the interpreter starts.
     setup: tuple[str, ...] = ()
-    #: Labels of its Kubernetes node; empty: its host name is the host's.
+    #: Labels of its Kubernetes node; if empty, the node is identified by the host's name.
     node_selector: dict[str, str] = field(default_factory=dict)
 
 
@@ -449,12 +461,12 @@ class PlanClaim:
     node: str
     parent: str
     child: str
-    #: The setting that stops it; empty: there is none.
+    #: The setting that stops the publication; empty without one.
     switch: str
 
 
 def switch_text(switch: dict[str, Any]) -> str:
-    """Return parameters as they are written in YAML."""
+    """Return parameters as YAML text."""
     return ", ".join(
         f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in switch.items()
     )
@@ -462,51 +474,54 @@ def switch_text(switch: dict[str, Any]) -> str:
 
 VERSION: Literal[3] = 3
 
-#: The file beside the plan that holds the whole robot's description.
+#: The file next to the plan with the description of the complete robot.
 DESCRIPTION = "robot.urdf"
-#: The file beside it that holds what a stock robot_state_publisher is given.
+#: The file next to the plan with the description for a stock robot_state_publisher.
 STOCK_DESCRIPTION = "robot.state_publisher.urdf"
 _NOWHERE = SourceLine("", 0)
 _STATE_PUBLISHER = "${executable:robot_state_publisher/robot_state_publisher}"
-#: What no name of a node may hold.
+#: Characters that are invalid in the name of a node.
 _NO_NAME = re.compile(r"\W")
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A compiled robot: everything that ``tfcompose up`` needs."""
+    """A compiled robot: all information that ``tfcompose up`` needs."""
 
     version: Literal[3] = field(default=VERSION, kw_only=True)
     robot: str
     spec_digest: str
     #: The robot file's name.
     file: str = field(default="", kw_only=True)
-    #: The profiles that are merged over the robot file, in order.
+    #: Profiles that are merged over the robot file, in order.
     profiles: tuple[str, ...] = field(default=(), kw_only=True)
+    #: Overlays that are merged over the robot file, in order: files, relative to the robot file,
+    #: and settings as ``--set PATH=VALUE``.
+    overlays: tuple[str, ...] = field(default=(), kw_only=True)
     description: str = field(default=DESCRIPTION, kw_only=True)
     base: str | None
-    #: The host whose processes, those that are not ``external``, this plan starts. None: all;
-    #: empty: the processes without a host.
+    #: The host whose processes this plan starts, except ``external`` processes. None for all
+    #: processes; empty for processes without a host.
     host: str | None = field(default=None, kw_only=True)
     ros: RosSettings
     edges: tuple[PlanEdge, ...]
     processes: tuple[PlanProcess, ...]
     claims: tuple[PlanClaim, ...] = field(default=(), kw_only=True)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
-    #: The robot file's arguments, as the plan was built with them.
+    #: Values of the robot file's arguments at the build.
     args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True)
-    #: The variables that the robot file names, as they were at the build.
+    #: Values of the environment variables that the robot file uses, at the build.
     environment: dict[str, str] = field(default_factory=dict, kw_only=True)
-    #: The computers that processes may name; empty: the file does not say how to reach them.
+    #: Computers that processes may name; empty if the robot file declares none.
     hosts: dict[str, PlanHost] = field(default_factory=dict, kw_only=True)
     #: Sections of tools, by their keys.
     sections: dict[str, Any] = field(default_factory=dict, kw_only=True)
 
     def process(self, name: str) -> PlanProcess:
-        """Return the process of that name.
+        """Return the process with this name.
 
         Raises:
-            KeyError: if there is none.
+            KeyError: if there is no such process.
         """
         for process in self.processes:
             if process.name == name:
@@ -515,9 +530,9 @@ class Plan:
 
     @property
     def started(self) -> tuple[PlanProcess, ...]:
-        """The processes that are started, in the plan's order.
+        """The processes to start, in order.
 
-        All but external ones, and what containers load.
+        External processes and components are not included.
         """
         return tuple(
             process for process in self.processes if process.kind not in ("external", "component")
@@ -525,27 +540,27 @@ class Plan:
 
     @property
     def managed(self) -> tuple[PlanProcess, ...]:
-        """What is started or loaded, in the plan's order: all but external processes."""
+        """The processes to start or load, in order: all except external processes."""
         return tuple(process for process in self.processes if process.kind != "external")
 
     @property
     def components(self) -> tuple[PlanProcess, ...]:
-        """What containers load, in the plan's order."""
+        """The components that containers load, in order."""
         return tuple(process for process in self.processes if process.component)
 
     def guards_of(self, host: str | None) -> tuple[str, ...]:
-        """Return the nodes of the guard of a host's share.
+        """Return the guard's nodes on a host.
 
-        None or empty: of the machine that has no name here.
+        None or an empty name means the machine that the plan does not name.
         """
-        own = [
+        guards = [
             node for process in self.processes if process.kind == "guard" for node in process.nodes
         ]
-        # No two nodes have one name.
-        return tuple(node.removesuffix(_name_end(self.host)) + _name_end(host) for node in own)
+        # Each host's guard needs a unique node name.
+        return tuple(node.removesuffix(_name_end(self.host)) + _name_end(host) for node in guards)
 
     def claim_on(self, nodes: tuple[str, ...], parent: str, child: str) -> PlanClaim | None:
-        """Return what is known of one of the nodes publishing the edge by default, or None."""
+        """Return the claim of one of the nodes to the edge, None without a claim."""
         ends = (parent, child)
         return next(
             (
@@ -557,9 +572,9 @@ class Plan:
         )
 
     def allows_undeclared(self, parent: str, child: str) -> bool:
-        """Whether nobody needs to have declared the edge.
+        """Return whether the edge needs no declaration.
 
-        By policy, or because it is another robot's.
+        That is so by policy, or because the edge belongs to another robot.
         """
         policy, ros = self.guard, self.ros
         if (
@@ -573,29 +588,42 @@ class Plan:
             for pattern in policy.allow
         )
 
+    @property
+    def adjusted(self) -> tuple[PlanEdge, ...]:
+        """The edges whose poses were adjusted on the running robot."""
+        return tuple(edge for edge in self.edges if edge.earlier)
+
+    def is_adjustable(self, edge: PlanEdge) -> bool:
+        """Return whether the edge's publisher takes another pose while it runs.
+
+        It is ``static``, or the stock robot_state_publisher that this plan starts.
+        """
+        owner = self.process(edge.owner)
+        return edge.kind == "static" and (owner.kind == "static" or owner.is_state_publisher)
+
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:
-        """Return the edges that the process publishes, in the plan's order."""
+        """Return the edges that the process publishes, in order."""
         return tuple(edge for edge in self.edges if edge.owner == owner)
 
     def start_settings(self, process: PlanProcess) -> tuple[Any, ...]:
-        """Return all of the plan that decides how the process runs.
+        """Return all values in the plan that determine how the process runs.
 
-        An edge's place in the robot file does not, nor the pose of an edge of the stock
-        robot_state_publisher, which takes another description while it runs, nor for the guard
-        that of one which ``static`` publishes.
+        An edge's place in the robot file is not included. The poses of edges of ``static`` and of
+        the stock robot_state_publisher are not included either, because these processes accept new
+        poses while they run.
         """
         guards = process.kind == "guard"
         edges = self.edges if guards else self.edges_of(process.name)
         fence = (self.robot, self.guard.fence) if self.guard.mode == "strict" else None
         unplaced = {
-            other.name
-            for other in self.processes
-            if other.is_state_publisher or (guards and other.kind == "static")
+            publisher.name
+            for publisher in self.processes
+            if publisher.is_state_publisher or publisher.kind == "static"
         }
         anywhere = [
             *(replace(edge, source=_NOWHERE) for edge in edges if edge.owner not in unplaced),
             *(
-                replace(edge, source=_NOWHERE, pose=Pose())
+                replace(edge, source=_NOWHERE, pose=Pose(), earlier=())
                 for edge in edges
                 if edge.owner in unplaced
             ),
@@ -604,9 +632,9 @@ class Plan:
         return process, self.ros, fence, anywhere, self.guard if guards else None, describes
 
     def describes(self, process: PlanProcess) -> bool:
-        """Return whether the process publishes a robot's description.
+        """Return whether the process publishes a robot description.
 
-        ``static`` does, and ``joints`` where there is no ``static`` beside it.
+        ``static`` does, and ``joints`` does if there is no ``static``.
         """
         static = f"{process.name.removesuffix('joints')}static"
         return process.kind == "static" or (

@@ -1,7 +1,7 @@
-"""The JSON Schema of ``plan.json``, made from the classes that a plan is read by.
+"""The JSON Schema of ``plan.json``, generated from the classes that read a plan.
 
-``schemas/plan.schema.json`` holds it; a test says when it must be made anew, by ``tfcompose schema
-plan``.
+``schemas/plan.schema.json`` contains it. If it is outdated, a test fails; ``tfcompose schema
+plan`` prints the new schema.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import msgspec
 
 from tfcompose.model import plan
 
-#: A field in the source of its class, behind the ``#:`` lines that describe it.
+#: A field in the source of its class, after the ``#:`` lines that describe it.
 _DESCRIBED = re.compile(r"^((?: {4}#: .*\n)+) {4}(\w+):", re.MULTILINE)
 
 
@@ -28,7 +28,7 @@ def field_comments(kind: type) -> dict[str, str]:
 def plan_schema() -> dict[str, Any]:
     """Return the schema, draft 2020-12.
 
-    Keys that it does not name are allowed: a later plan may have more.
+    Unknown keys are allowed, because a later version may add keys.
     """
     schema = msgspec.json.schema(plan.Plan)
     classes: dict[str, dict[str, Any]] = schema["$defs"]

@@ -1,9 +1,7 @@
-"""Stock nodes in the place of tfcompose's own publishers.
+"""Stock nodes of ROS that can replace tfcompose's publishers: their names and limits.
 
-Their names, and what robot_state_publisher accepts.
-
-``export launch`` starts them, and ``verify`` takes what they send for their owners', where these
-do not run.
+``export launch`` starts them. ``verify`` accepts edges from them in place of the owners, if the
+owners do not run.
 """
 
 from __future__ import annotations
@@ -15,23 +13,23 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
 
 STATE_PUBLISHER = "robot_state_publisher"
-#: The highest publish_frequency that it accepts: tfcompose's own publisher passes every joint
-#: state on.
+#: The maximum publish_frequency that robot_state_publisher accepts. tfcompose's own publisher
+#: passes on every joint state.
 MOST_HZ = 1000.0
-#: The kinds of processes that stock nodes stand in for.
+#: Kinds of processes that stock nodes can replace.
 OWN_KINDS = ("static", "joints")
 _NO_NODE = re.compile(r"\W")
 
 
 def static_names(plan: Plan) -> dict[str, str]:
-    """Return the name of the static_transform_publisher of each own fixed edge, by its child.
+    """Return a unique name of a static_transform_publisher for each fixed edge, by child.
 
-    No two are the same.
+    Only edges of tfcompose's ``static`` are included.
     """
-    own = {process.name for process in plan.processes if process.kind in OWN_KINDS}
+    owners = {process.name for process in plan.processes if process.kind in OWN_KINDS}
     names: dict[str, str] = {}
     for edge in plan.edges:
-        if edge.owner in own and edge.kind == "static":
+        if edge.owner in owners and edge.kind == "static":
             name = f"static_{_NO_NODE.sub('_', edge.child)}"
             while name in names.values():
                 name += "_"
@@ -40,8 +38,8 @@ def static_names(plan: Plan) -> dict[str, str]:
 
 
 def stand_ins(plan: Plan) -> dict[str, frozenset[str]]:
-    """Return the stock nodes that may send an own edge instead, by child."""
-    own = {process.name for process in plan.processes if process.kind in OWN_KINDS}
+    """Return the stock nodes that may publish an edge instead of its owner, by child."""
+    owners = {process.name for process in plan.processes if process.kind in OWN_KINDS}
     below = f"/{plan.ros.namespace}/" if plan.ros.namespace else "/"
     fixed = static_names(plan)
     return {
@@ -49,5 +47,5 @@ def stand_ins(plan: Plan) -> dict[str, frozenset[str]]:
             below + name for name in (STATE_PUBLISHER, fixed.get(edge.child, STATE_PUBLISHER))
         )
         for edge in plan.edges
-        if edge.owner in own
+        if edge.owner in owners
     }

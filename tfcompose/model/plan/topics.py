@@ -1,9 +1,7 @@
-"""On which topics a plan's processes publish TF.
+"""The topics on which a plan's processes publish TF, and the isolation of these processes.
 
-Those of the plan, and behind which fence, if its guard is strict.
-
-A fence is a DDS partition, or topics of each process's own, to which it is remapped. Launcher and
-guard both know it.
+A strict guard isolates processes by a DDS partition, or by remapping each process to separate
+topics. Both the launcher and the guard use this module.
 """
 
 from __future__ import annotations
@@ -25,11 +23,11 @@ if TYPE_CHECKING:
 #: Topics of moving and of fixed edges.
 Topics = tuple[str, str]
 
-#: The topics of moving and of fixed edges, where nothing moves them.
+#: The default topics of moving and of fixed edges.
 GLOBAL = ("/tf", "/tf_static")
-#: The folder with profile files, beside a run's plan.
+#: The folder with profile files, next to a run's plan.
 _FENCE = "fence"
-#: What no part of a topic's name may hold.
+#: Underscores that are invalid in a part of a topic's name.
 _UNDERSCORES = re.compile(r"__+|_(?=/|$)")
 
 
@@ -40,9 +38,9 @@ def topics_below(namespace: str) -> Topics:
 
 
 def namespace_options(names: Iterable[str]) -> str:
-    """Return the options that lead to these topics.
+    """Return the options that select these topics.
 
-    ``--namespace /robot1 or --namespace /robot2``.
+    For example, ``--namespace /robot1 or --namespace /robot2``.
     """
     spaces = dict.fromkeys(name.rpartition("/")[0] for name in names)
     return " or ".join(map(_namespace_option, spaces))
@@ -62,7 +60,7 @@ def parts_of(plan: Plan) -> dict[Topics, Plan]:
 
 
 def joint_states_topic(plan: Plan, edge: PlanEdge) -> str:
-    """Return the topic on which the owner of a joint's edge hears its states."""
+    """Return the topic on which the owner of a joint's edge receives joint states."""
     name = "joint_states"
     topic = posixpath.join(posixpath.dirname(edge.node), name)
     remap = plan.process(edge.owner).remap
@@ -70,15 +68,15 @@ def joint_states_topic(plan: Plan, edge: PlanEdge) -> str:
 
 
 def joint_states_topics(plan: Plan) -> list[str]:
-    """Return the topics on which the plan's owners hear joint states, each once."""
+    """Return the topics on which the plan's owners receive joint states, without duplicates."""
     edges = [edge for edge in plan.edges if edge.kind == "joint"]
     return list(dict.fromkeys(joint_states_topic(plan, edge) for edge in edges))
 
 
 def partition_of(plan: Plan) -> str:
-    """Return the partition that the plan's processes send TF in.
+    """Return the partition in which the plan's processes publish TF.
 
-    Those of one host, where it runs on several.
+    If the plan runs on several hosts, each host has its own partition.
     """
     return (
         f"tfc_{plan.robot}.{re.sub(r'[^A-Za-z0-9.-]', '_', plan.host)}"
@@ -93,9 +91,9 @@ def fence_file(folder: Path, process: str) -> Path:
 
 
 def is_fence(file: str, process: str) -> bool:
-    """Return whether a profile file is one that fences the process off.
+    """Return whether a profile file isolates the process.
 
-    That of the run's plan before is one, too.
+    The file may also belong to a previous plan of the run.
     """
     return PurePosixPath(file).parts[-2:] == PurePosixPath(fence_file(Path(), process)).parts[-2:]
 
@@ -103,7 +101,7 @@ def is_fence(file: str, process: str) -> bool:
 def judged_topics(plan: Plan) -> set[Topics]:
     """Return the pairs of topics that the guard watches.
 
-    A process that sends on others is nobody's business.
+    The guard ignores processes that publish on other topics.
     """
     return {process.topics for process in plan.processes if process.kind == "guard"} | parts_of(
         plan
@@ -111,9 +109,9 @@ def judged_topics(plan: Plan) -> set[Topics]:
 
 
 def private_topics(plan: Plan) -> dict[str, Topics]:
-    """Return the remapped topics (moving, fixed) of each process that can be remapped.
+    """Return the separate topics (moving, fixed) of each process that can be remapped.
 
-    Their first underscore hides them from lists of topics.
+    The names begin with an underscore, which hides them from lists of topics.
     """
     judged = judged_topics(plan)
     folders = {
@@ -125,10 +123,10 @@ def private_topics(plan: Plan) -> dict[str, Topics]:
 
 
 def takes_remappings(process: PlanProcess) -> bool:
-    """Return whether we start it, it may send TF, and it takes ROS arguments.
+    """Return whether tfcompose starts the process, it may publish TF, and it takes ROS arguments.
 
-    What is started by a plain command may be no ROS node at all, unless it owns an edge or is
-    given ROS arguments. What follows a text that a shell reads does not reach the program.
+    A plain command counts only if it owns an edge or has ROS arguments, because it may not be a
+    ROS node. Arguments after a shell command do not reach the program.
     """
     if process.kind != "run":
         return process.kind in ("static", "joints", "simulate", "component")
@@ -142,6 +140,6 @@ def takes_remappings(process: PlanProcess) -> bool:
 
 
 def _plain(name: str) -> str:
-    """Return the name as part of a topic: no double or trailing underscores."""
+    """Return the name as a part of a topic, without double or trailing underscores."""
     plain = _UNDERSCORES.sub("_0", name)
     return name if plain == name else f"{plain}_{crc32(name.encode()):08x}"

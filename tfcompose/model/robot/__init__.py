@@ -1,8 +1,9 @@
-"""The robot: frames, edges, bodies, joints and processes, with every name, pose and owner decided.
+"""The robot: frames, edges, bodies, joints and processes, with final names, poses and owners.
 
-A ``Robot`` can hold a wrong robot: two parents, a cycle or two owners are for a rule to report.
-Lengths are metres, angles radians, rates hertz; an edge's pose is the pose of its child in its
-parent. What only some robots have stands in ``hardware``, which is imported by that name.
+A ``Robot`` may be invalid. For example, it may have two parents, a cycle or two owners, which
+rules report. Lengths are in metres, angles in radians and rates in Hz. An edge's pose is the pose
+of its child in its parent. Classes that only some robots need are in ``hardware``, which code
+imports directly.
 """
 
 from tfcompose.model.robot.body import (

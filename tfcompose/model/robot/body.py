@@ -1,4 +1,4 @@
-"""Body of a link: shapes, materials and mass."""
+"""The body of a link: shapes, materials and mass."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """A mesh or an image, by its address and its file."""
+    """A mesh or an image, with its address and its file."""
 
     uri: str
     span: Span | None = None
-    #: The file: absolute, or relative like the robot's own file; empty if it cannot be known here.
+    #: The path of the file: absolute, or relative like the path of the robot file; empty if
+    #: unknown.
     path: str = ""
-    #: The package that it is in, if any.
+    #: The package that contains the file, if there is one.
     package: str = ""
-    #: The path in that package.
+    #: The path in the package.
     inside: str = ""
 
 
@@ -38,7 +39,7 @@ class Material:
 
 
 def colour_name(rgba: Sequence[float]) -> str:
-    """Return a name for a colour that has none, so that URDF keeps colours apart."""
+    """Return a name for an unnamed colour, so that URDF keeps different colours apart."""
     return "_".join(["rgba", *(f"{part:g}".replace(".", "p").replace("-", "m") for part in rgba)])
 
 
@@ -47,8 +48,8 @@ class Shape:
     """A body's shape and its pose in the link."""
 
     kind: Literal["box", "cylinder", "sphere", "capsule", "mesh"]
-    #: In metres. Box: x, y, z. Cylinder and capsule: radius, length (a capsule's without its
-    #: ends). Sphere: radius. Mesh: its scale along x, y, z.
+    #: In metres. Box: x, y, z. Cylinder and capsule: radius, length, which excludes the ends of a
+    #: capsule. Sphere: radius. Mesh: its scale along x, y, z.
     size: tuple[float, ...]
     pose: Pose
     material: Material | None = None
@@ -56,9 +57,9 @@ class Shape:
 
     @property
     def radius(self) -> float:
-        """The radius of the sphere around the shape, in metres.
+        """The radius of the bounding sphere, in metres.
 
-        Endless for a mesh, whose extent its file knows.
+        Infinite for a mesh, because its size is only in its file.
         """
         match self.kind:
             case "sphere":
@@ -76,17 +77,17 @@ class Shape:
 class Inertial:
     """Mass, centre of mass and inertia of a link."""
 
-    #: In kg.
+    #: Mass in kg.
     mass: float
     #: The pose of the centre of mass in the link.
     pose: Pose
-    #: About the centre of mass, in kg m²: xx, xy, xz, yy, yz, zz.
+    #: Tensor about the centre of mass in kg m²: xx, xy, xz, yy, yz, zz.
     tensor: tuple[float, float, float, float, float, float]
-    #: If the tensor was given: the traces that the visual and the collision shapes would have at
-    #: one density. A trace does not depend on the axes.
+    #: For a given tensor: the traces that the visual and the collision shapes would have at
+    #: uniform density. A trace does not depend on the axes.
     of_shapes: tuple[float, ...] = ()
     span: Span | None = None
-    #: The span of the mass, or of the density that it follows from.
+    #: The span of the mass, or of the density that determines the mass.
     mass_at: Span | None = field(default=None, compare=False)
 
 
@@ -99,7 +100,7 @@ class Link:
     visuals: tuple[Shape, ...] = ()
     collisions: tuple[Shape, ...] = ()
     inertial: Inertial | None = None
-    #: Whether a mass was given, even without an inertia.
+    #: Whether the file states a mass, even without an inertia.
     has_mass: bool = False
 
 

@@ -1,4 +1,4 @@
-"""Hardware of ros2_control, and elements that the URDF keeps verbatim."""
+"""Hardware of ros2_control, and elements that the URDF contains verbatim."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """An interface of ros2_control, with its parameters as texts."""
+    """An interface of ros2_control, with its parameters as strings."""
 
     name: str
     params: dict[str, str] = field(default_factory=dict)
@@ -36,7 +36,7 @@ class HardwareComponent:
 
 @dataclass(frozen=True, slots=True)
 class Hardware:
-    """A hardware component of ros2_control: the plugin and what it drives."""
+    """A hardware component of ros2_control: the plugin, and the components that it drives."""
 
     name: str
     plugin: str
@@ -48,38 +48,38 @@ class Hardware:
     is_async: bool | None = None
 
 
-#: What has a name of its own in a raw block.
+#: Elements in a raw block that have a unique name.
 _NAMED = re.compile(
     r"""<(?:transmission|actuator|ros2_control|sensor|gpio)\b[^>]*?\bname\s*=\s*["']([^"']+)"""
 )
-#: All that stands between quotes, or between two tags.
+#: Text in quotes, or between two tags.
 _HELD = re.compile(r"""(=\s*")([^<"]*)(?=")|(=\s*')([^<']*)(?=')|(>)([^<>]*)(?=<)""")
 
-#: Both, since a value may stand in either.
+#: Escapes for both kinds of quotes, because either may enclose a value.
 _QUOTES = {'"': "&quot;", "'": "&#x27;"}
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Elements that stand in the URDF as the user wrote them."""
+    """Elements that the URDF contains exactly as the user wrote them."""
 
     name: str
     span: Span
     text: str
-    #: Their spans, in order, if known.
+    #: Spans of the elements, in order, if known.
     places: tuple[Span, ...] = field(default=(), compare=False)
 
     def own_names(self) -> list[str]:
-        """Return the names of its elements that must be unique in the robot."""
+        """Return names of the block's elements that must be unique in the robot."""
         return _NAMED.findall(self.text)
 
     def rename(self, names: Mapping[str, str]) -> Block:
-        """Return the block with other names.
+        """Return the block with names replaced.
 
-        Of what an attribute or an element holds, if that is a name alone.
+        Only attributes and texts that consist of a name are changed.
         """
 
-        def other(match: re.Match[str]) -> str:
+        def rename_match(match: re.Match[str]) -> str:
             before, held = (part for part in match.groups() if part is not None)
             name = held.strip()
             again = names.get(html.unescape(name))
@@ -87,4 +87,4 @@ class Block:
                 match[0] if again is None else before + held.replace(name, escape(again, _QUOTES))
             )
 
-        return replace(self, text=_HELD.sub(other, self.text))
+        return replace(self, text=_HELD.sub(rename_match, self.text))

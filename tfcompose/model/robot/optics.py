@@ -16,7 +16,7 @@ Sector = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class OpticsSource:
-    """Where the values of some keys are from, and of what kind that is."""
+    """The source of the values of some keys, and the kind of source."""
 
     keys: tuple[str, ...]
     where: str
@@ -25,10 +25,11 @@ class OpticsSource:
 
 @dataclass(frozen=True, slots=True)
 class Optics:
-    """One stream of a sensor, in its frame.
+    """A stream of a sensor, in the stream's frame.
 
     Unknown values are None. Lengths are in metres, angles in radians. A camera looks along z of
-    the frame, x right and y down (REP-103). Every other kind looks along x, y left and z up.
+    its frame, with x right and y down (REP-103). Every other kind looks along x, with y left and z
+    up.
     """
 
     stream: str
@@ -36,32 +37,31 @@ class Optics:
     kind: OpticsKind
     span: Span
     projection: Projection = "pinhole"
-    #: A camera that looks along -z, with y up.
+    #: Whether the camera looks along -z, with y up.
     backward: bool = False
-    #: [from, to], counted from the viewing direction, left positive; a lidar's are angles of the
-    #: LaserScan.
+    #: [from, to] from the viewing direction, positive to the left. For a lidar, these are the
+    #: angles of LaserScan.
     horizontal: Sector | None = None
-    #: [from, to], counted from the viewing direction, up positive; a lidar's are elevations of
-    #: beams.
+    #: [from, to] from the viewing direction, positive upwards. For a lidar, these are elevations
+    #: of beams.
     vertical: Sector | None = None
-    #: The full angle from corner to corner, or of a fisheye's image circle.
+    #: The full angle from corner to corner, or of the image circle of a fisheye camera.
     diagonal: float | None = None
     #: Width and height in pixels.
     resolution: tuple[int, int] | None = None
-    #: For a camera that measures depth a value of z, so that its faces are flat; for every other
-    #: kind a distance along the ray.
+    #: Smallest distance: for a depth camera along z, for every other kind along the ray.
     near: float | None = None
-    #: As ``near``.
+    #: Largest distance, measured like ``near``.
     far: float | None = None
     channels: int | None = None
     #: Elevations of a lidar's channels.
     elevations: tuple[float, ...] = ()
-    #: The number in one scan or one turn.
+    #: Number of samples in a scan or a revolution.
     samples: int | None = None
     rate: float | None = None
     shutter: Shutter | None = None
-    #: The distance of the two imagers from which depth is computed.
+    #: Distance of the two imagers of a stereo camera.
     baseline: float | None = None
-    #: Whether the stream emits the light or sound that it receives.
+    #: Whether the sensor emits the light or sound that it receives.
     active: bool = False
     sources: tuple[OpticsSource, ...] = ()

@@ -1,4 +1,4 @@
-"""A process before it is a command line, its nodes, and what they publish by default."""
+"""A process before it becomes a command line, its nodes, and the edges that they claim."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tfcompose.model.plan.topics import GLOBAL
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
 BUILT_IN = (STATIC, JOINTS, GUARD)
-#: How a command begins that a shell reads.
+#: Beginning of a command that a shell runs.
 SHELL = ("/bin/sh", "-c")
-#: How a command begins that runs launch files.
+#: Beginning of a command that runs a launch file.
 ROS2_LAUNCH = ("ros2", "launch")
 
 if TYPE_CHECKING:
@@ -25,46 +25,46 @@ if TYPE_CHECKING:
 
 
 class AsInFile(str):
-    """A parameter as it is without quotes in a parameter file: ROS decides what it is."""
+    """An unquoted value from a parameter file; ROS determines its type."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One ROS node of a process, by its full name."""
+    """A ROS node of a process; ``name`` is its full name."""
 
     name: str
     span: Span
     #: The path of the mapping with its parameters.
     path: tuple[str | int, ...] = ()
     params: dict[str, Any] = field(default_factory=dict)
-    #: The state that it is brought into.
+    #: The state into which the guard brings the node.
     lifecycle: LifecycleState | None = None
-    #: Parameters, by full name, that are known to contradict the tree.
+    #: Full names of parameters that contradict the tree.
     contradicting: frozenset[str] = frozenset()
-    #: Spans of the top-level parameters in the robot file. For a parameter from a file: where that
-    #: file is named, and then the span in it.
+    #: Spans of the top-level parameters in the robot file. For a parameter from a parameter file,
+    #: the span of the file's name and the span in the file.
     places: Mapping[str, tuple[Span, ...]] = field(default_factory=dict, compare=False)
 
     @property
     def flat_params(self) -> dict[str, Any]:
-        """The parameters by their full names, with dots."""
+        """The parameters by full name, with dots."""
         return {name: _read_as_ros(value) for name, value in self.flat_texts.items()}
 
     @property
     def flat_texts(self) -> dict[str, Any]:
-        """The same, with what a parameter file says as it stands there."""
+        """The parameters by full name, with values of parameter files as text."""
         return _flat(self.params)
 
 
 def _flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for key, value in params.items():
-        found |= (
+        flat |= (
             _flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": value}
         )
-    return found
+    return flat
 
 
 _TRUTHS = {
@@ -84,7 +84,7 @@ _DOUBLE = re.compile(
 
 
 def value_of_word(text: str) -> bool | float | str:
-    """Return what rcl takes an unquoted word of a parameter file for: on is true, 012 ten."""
+    """Return the value that rcl reads from an unquoted word: ``on`` is true, 012 is ten."""
     if text in _TRUTHS:
         return _TRUTHS[text]
     for form, base in ((_HEX, 16), (_OCTAL, 8), (_DECIMAL, 10)):
@@ -97,7 +97,7 @@ def value_of_word(text: str) -> bool | float | str:
 
 
 def _read_as_ros(value: Any) -> Any:
-    """Return a word of a parameter file as ROS reads it if it is a switch, or as text."""
+    """Return a word of a parameter file as a boolean if ROS reads one, otherwise as text."""
     if not isinstance(value, AsInFile):
         return value
     typed_value = value_of_word(value)
@@ -106,10 +106,10 @@ def _read_as_ros(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Process(PlanProcess):
-    """A process of the plan, with what only the compiler needs.
+    """A process of the plan, with data that only the compiler needs.
 
-    It runs an executable of a package, a launch file, or the command ``argv``. For the first two,
-    ``argv`` has the arguments until ``to_plan`` makes a complete command.
+    It runs an executable of a package, a launch file, or the command ``argv``. In the first two
+    cases, ``argv`` holds only arguments until ``to_plan`` builds the complete command.
     """
 
     nodes: tuple[str, ...] = field(init=False)
@@ -121,19 +121,19 @@ class Process(PlanProcess):
     executable: str | None = field(default=None, kw_only=True)
     #: A launch file: ``package/file``.
     launch: str | None = field(default=None, kw_only=True)
-    #: The rate of the joint states that it sends, in hertz.
+    #: Rate of the joint states that the process publishes, in Hz.
     rate: float | None = field(default=None, kw_only=True)
-    #: The ``Part`` that it belongs to, if any.
+    #: The name of its ``Part``; empty for a process of the robot itself.
     part: str = field(default="", kw_only=True)
     #: Whether its parameter ``robot_description`` is the URDF, for a stock robot_state_publisher.
     describes: bool = field(default=False, kw_only=True)
     #: Whether it is a container of components.
     loads: bool = field(default=False, kw_only=True)
-    #: The span of its host, if it names one.
+    #: The span of its host, if the file names one.
     host_at: Span | None = field(default=None, kw_only=True, compare=False)
     #: Parameters for each of its nodes, including unlisted ones.
     all_nodes: Node | None = field(default=None, kw_only=True)
-    #: Those parameters, and the ones that its parameter files give to unlisted nodes, by names and
+    #: These parameters, and parameters for unlisted nodes from its parameter files, by names and
     #: patterns in order.
     other_params: dict[str, Any] = field(default_factory=dict, kw_only=True)
 
@@ -143,21 +143,24 @@ class Process(PlanProcess):
         object.__setattr__(self, "lifecycle", states)
 
     def to_plan(self, **made: Any) -> PlanProcess:
-        """Return the process as the plan has it, with fields that follow from the whole robot."""
+        """Return the process in the form of the plan.
+
+        The form includes fields that depend on the complete robot.
+        """
         return narrow(PlanProcess, self, **made)
 
     @property
     def takes_ros_arguments(self) -> bool:
-        """Whether what follows on the command line reaches a node.
+        """Whether further arguments on the command line reach a node.
 
-        A shell and a launch file do not pass it on.
+        A shell and a launch file do not pass them on.
         """
         return self.launch is None and self.argv[:2] not in {SHELL, ROS2_LAUNCH}
 
     def is_node(self, *, owns: bool) -> bool:
-        """Return whether the process is surely a ROS node, and is given ROS arguments.
+        """Return whether the process is certainly a ROS node that accepts ROS arguments.
 
-        A plain command is one if it ``owns`` an edge, or has settings that only nodes have.
+        A plain command counts if it ``owns`` an edge or has settings that only nodes have.
         """
         if self.kind != "run" or self.package is not None or self.launch is not None:
             return True
@@ -174,14 +177,14 @@ class Process(PlanProcess):
         )
 
     def with_default_level(self, level: LogLevel) -> Process:
-        """Return the process with this log level, if it is a program without its own."""
+        """Return the process with this log level, if it is a program without a log level."""
         if self.log_level or self.kind != "run" or self.launch is not None:
             return self
         return replace(self, log_level=level)
 
     @property
     def node(self) -> str:
-        """The full name of the first node, which is the only one of most processes."""
+        """The full name of the first node, which is usually the only node."""
         return self.nodes[0] if self.nodes else ""
 
     @property
@@ -192,12 +195,12 @@ class Process(PlanProcess):
 
 @dataclass(frozen=True, slots=True)
 class Host(PlanHost):
-    """A computer of the plan, with the place of its name."""
+    """A computer of the plan, with the span of its name."""
 
     span: Span = field(kw_only=True, compare=False)
 
     def to_plan(self) -> PlanHost:
-        """Return the computer as the plan has it."""
+        """Return the computer in the form of the plan."""
         return narrow(PlanHost, self)
 
 
@@ -214,5 +217,5 @@ class Claim(PlanClaim):
         object.__setattr__(self, "switch", switch_text(self.off))
 
     def to_plan(self) -> PlanClaim:
-        """Return the claim as the plan has it."""
+        """Return the claim in the form of the plan."""
         return PlanClaim(self.node, self.parent, self.child, self.switch)

@@ -1,4 +1,4 @@
-"""A robot, its parts and sensors, and the numbers as they were written."""
+"""A robot, its parts and sensors, and the numbers in its files."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from tfcompose.model.robot.optics import Optics
     from tfcompose.model.robot.process import Claim, Host, Process
 
-#: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, a link's,
-#: and a short one.
+#: Endings of names of optical frames: REP-103's suffix, the spelling of newer ZED wrappers, the
+#: suffix for a link, and a short suffix.
 OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical_link", "_optical")
 
 
 def is_optical(frame: str) -> bool:
-    """Return whether the frame's name says that z is its viewing direction."""
+    """Return whether the frame's name implies that z is its viewing direction."""
     return frame.endswith(OPTICAL_ENDINGS)
 
 
@@ -37,17 +37,18 @@ def is_optical(frame: str) -> bool:
 class SensorTopic:
     """A topic that a sensor's driver publishes by default."""
 
-    #: As its driver names it: relative to the namespace, or to the node if it begins with ``~/``.
+    #: The name that the driver uses: relative to the namespace, or to the node if it begins with
+    #: ``~/``.
     name: str
-    #: As in the graph: ``sensor_msgs/msg/Imu``.
+    #: The type as in the ROS graph: ``sensor_msgs/msg/Imu``.
     type: str
-    #: The frame in its headers.
+    #: The frame in the headers of its messages.
     frame: str
 
 
 @dataclass(frozen=True, slots=True)
 class MountedSensor:
-    """A sensor as the rules see it: the frames that it brings, and its driver."""
+    """A sensor as the rules see it: its frames and its driver."""
 
     name: str
     preset: str
@@ -58,57 +59,57 @@ class MountedSensor:
     driver_frames: tuple[str, ...] = ()
     #: The process of its driver; empty without one.
     driver: str = ""
-    #: Parameters that keep the driver from publishing frames; None: there are none.
+    #: Parameters that stop the driver from publishing frames, None if there are none.
     switch: dict[str, Any] | None = None
     #: Whether the driver may publish frames.
     publishes: bool = False
-    #: Edges outside the sensor that the driver publishes by default and does not own, each with
-    #: the parameters that prevent it.
+    #: Edges outside the sensor that the driver publishes by default and does not own, with the
+    #: parameters that stop it.
     claims: dict[str, dict[str, Any]] = field(default_factory=dict)
-    #: Whether it does so if no parameter says otherwise.
+    #: Whether the driver publishes frames by default.
     by_default: bool = True
     #: The preset's option for a serial number; empty if it has none.
     serial_option: str = ""
     serial: str | None = None
     tf_at: Span | None = None
-    #: The field of view of each stream, as far as it is known.
+    #: The field of view of each stream, if known.
     optics: tuple[Optics, ...] = ()
-    #: What its driver publishes, as far as the preset knows.
+    #: Topics that its driver publishes, if the preset lists them.
     topics: tuple[SensorTopic, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """A box that sensors have to see."""
+    """A box that sensors must see."""
 
     name: str
     span: Span
     #: The frame of ``center`` and ``size``.
     frame: str
-    #: In metres.
+    #: Centre in metres.
     center: Vector
     #: Lengths along the axes, in metres.
     size: Vector
-    #: Kinds of streams, or sensors, one of which has to see it.
+    #: Kinds of streams, or sensors, at least one of which must see each point.
     by: tuple[str, ...] = ()
-    #: The share that must be seen.
+    #: The fraction of the box that must be seen.
     least: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class SourceNumbers:
-    """The numbers of a pose or limit from the source file, in SI units, with their spans."""
+    """The numbers of a pose or a limit in the source file, in SI units, with their spans."""
 
     #: The path of the value: ``sensors``, ``camera``, ``rpy``.
     path: tuple[str | int, ...]
     numbers: tuple[float, ...]
-    #: For each number, whether the file gives a unit.
+    #: Whether each number has a unit in the file.
     with_unit: tuple[bool, ...]
     #: Returns the span of the number with this index.
     locate: Callable[[int], Span] = field(compare=False, repr=False)
-    #: The entry's name in the complete robot, if the file is a part's.
+    #: The entry's name in the complete robot, if the file belongs to a part.
     in_part: str = ""
-    #: Keys or indices of the numbers, as far as they are known.
+    #: Keys or indices of the numbers, if known.
     steps: tuple[str | int, ...] = ()
 
     @property
@@ -118,7 +119,10 @@ class SourceNumbers:
 
     @property
     def entry(self) -> str:
-        """The name in its file of the frame, link, joint, sensor or process of the value."""
+        """The name of the entry with the value, in its file.
+
+        A frame, link, joint, sensor or process.
+        """
         return str(self.path[1])
 
     @property
@@ -129,40 +133,40 @@ class SourceNumbers:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A tool's section of the robot file, as its model has it."""
+    """A tool's section of the robot file, validated with its model."""
 
     name: str
     value: Any
     #: Returns the span of a path in the section.
     locate: Callable[[tuple[str | int, ...]], Span] = field(compare=False, repr=False)
-    #: The section as JSON; None: it is not in the plan.
+    #: The section as JSON data, None if the plan does not contain it.
     planned: Any = None
 
     def span_of(self, *path: str | int) -> Span:
-        """Return the place of a value in the section, or of the nearest around it."""
+        """Return the span of a value in the section, or of the nearest enclosing value."""
         return self.locate((self.name, *path))
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part that is a robot beside others, with its own publishers and description."""
+    """A part that is a separate robot, with its own publishers and description."""
 
     name: str
-    #: What the frames and joints of the part begin with in the robot that holds it.
+    #: Prefix of the part's frames and joints in the including robot.
     prefix: str
-    #: The part, with the names of its own file.
+    #: The part with the names in its own file.
     robot: Robot
 
 
-def may_be_refused(name: str, broken: frozenset[tuple[str, str]], known: Iterable[str]) -> bool:
-    """Return whether a refused entry (section, name) would have brought a name.
+def may_be_refused(name: str, broken: frozenset[tuple[str, str]], declared: Iterable[str]) -> bool:
+    """Return whether a rejected entry (section, name) may have defined a name.
 
-    A part without a prefix may have brought any name; one that is a letter off the ``known`` ones
-    is wrong still.
+    A rejected part without a prefix may have defined any name. But a name that differs by a typing
+    error from a declared name is still wrong.
     """
     if ("parts", "") in broken:
-        known = tuple(known)
-        return name in known or slip_of(name, known) is None
+        declared = tuple(declared)
+        return name in declared or slip_of(name, declared) is None
     names, beginnings = _names_refused_entries(broken)
     return name in names or name.startswith(beginnings)
 
@@ -178,11 +182,11 @@ def advise_left_out(conditions: Mapping[tuple[str, str], str], name: str) -> str
     return ""
 
 
-@lru_cache(maxsize=8)  # a robot's names are looked up in the same entries
+@lru_cache(maxsize=8)  # lookups of a robot's names use the same entries
 def _names_refused_entries(
     broken: frozenset[tuple[str, str]],
 ) -> tuple[frozenset[str], tuple[str, ...]]:
-    """Return the names that refused entries would have brought, and prefixes of more."""
+    """Return the names that rejected entries would have defined, and prefixes of further names."""
     beginnings = [f"{entry}_" for section, entry in broken if section == "sensors"]
     beginnings += [entry for section, entry in broken if section == "parts"]
     return frozenset(entry for _, entry in broken), tuple(beginnings)
@@ -190,7 +194,7 @@ def _names_refused_entries(
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """One robot, resolved."""
+    """A resolved robot."""
 
     name: str
     file: str
@@ -199,8 +203,10 @@ class Robot:
     edges: tuple[Edge, ...]
     links: dict[str, Link]
     processes: tuple[Process, ...]
-    #: The root of the URDF; None: the tree has no single root.
+    #: The root of the URDF, None if the tree has no single root.
     base: str | None
+    #: The frame on the floor; None: no frame is declared there.
+    ground: str | None = None
     ros: RosSettings = field(default_factory=RosSettings)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
     #: Sensors with a known preset.
@@ -215,16 +221,16 @@ class Robot:
     environment: dict[str, str] = field(default_factory=dict, compare=False)
     #: The plain data that the robot was made from, with profiles merged.
     source_data: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
-    #: Entries (section, name) that were refused; for a part, the beginning of its names.
+    #: Rejected entries, as (section, name); for a rejected part, the prefix of its names.
     broken: frozenset[tuple[str, str]] = frozenset()
     claims: tuple[Claim, ...] = ()
-    #: Parts that are robots of their own.
+    #: Parts that are separate robots.
     parts: tuple[Part, ...] = ()
     #: The root frame of each part, by its name.
     mounted: dict[str, str] = field(default_factory=dict, compare=False)
     hardware: tuple[Hardware, ...] = ()
     blocks: tuple[Block, ...] = ()
-    #: Files of other tools, in which nothing can be fixed here.
+    #: Files of other tools, for which tfcompose offers no edits.
     foreign: frozenset[str] = field(default=frozenset(), compare=False)
     #: Spans of refused entries of the file.
     refused: tuple[Span, ...] = field(default=(), compare=False)
@@ -234,25 +240,27 @@ class Robot:
     is_variant: bool = field(default=False, compare=False)
     #: The names of the merged profiles, in order.
     profiles: tuple[str, ...] = field(default=(), compare=False)
-    #: Zones that sensors have to see.
+    #: The merged overlays' files, and settings as ``--set PATH=VALUE``, in order.
+    overlays: tuple[str, ...] = field(default=(), compare=False)
+    #: Zones that sensors must see.
     zones: tuple[Zone, ...] = ()
-    #: The file's limits of codes, instead of the defaults.
+    #: Limits of codes that the file sets instead of the defaults.
     limits: dict[str, float] = field(default_factory=dict, compare=False)
-    #: Conditions that left entries out, by (section, name).
+    #: Conditions that removed entries, by (section, name).
     conditions: dict[tuple[str, str], str] = field(default_factory=dict, compare=False)
-    #: The computers that it may run on, including its parts'; empty: not declared.
+    #: Computers that may run the robot and its parts; empty if not declared.
     hosts: dict[str, Host] = field(default_factory=dict)
     #: Sections of tools, by name.
     sections: dict[str, Section] = field(default_factory=dict, compare=False, repr=False)
 
     def final(self, frame: str) -> str:
-        """Return the frame's name on the live tree: with the prefix, unless it is shared."""
+        """Return the frame's name on /tf: with the prefix, unless the frame is shared."""
         return frame if frame in self.ros.shared_frames else f"{self.ros.frame_prefix}{frame}"
 
     def with_final_names(self) -> Robot:
-        """Return the robot with every frame named as on the live tree.
+        """Return the robot with the frame names as on /tf.
 
-        URDF keeps plain names; RViz adds the prefix.
+        A URDF has plain names, and RViz adds the prefix.
         """
         if not self.ros.frame_prefix:
             return self
@@ -275,6 +283,7 @@ class Robot:
                 for edge in self.edges
             ),
             base=self.base and final(self.base),
+            ground=self.ground and final(self.ground),
             claims=tuple(
                 replace(claim, parent=final(claim.parent), child=final(claim.child))
                 for claim in self.claims
@@ -282,43 +291,43 @@ class Robot:
             guard=replace(self.guard, allow=allow),
         )
 
-    def excuses(self, name: str) -> bool:
-        """Return whether a frame, process or joint may be missing because of a refused entry."""
+    def tolerates(self, name: str) -> bool:
+        """Return whether a frame, process or joint may be missing because of a rejected entry."""
         return may_be_refused(
             name, self.broken, chain(self.frames, (process.name for process in self.processes))
         )
 
     def is_foreign(self, span: Span | None) -> bool:
-        """Return whether the place is in a URDF, or what xacro made.
+        """Return whether the span is in a URDF or in output of xacro.
 
-        Advice speaks of XML there.
+        Advice about such a place refers to XML.
         """
         return span is not None and span.file in self.foreign
 
     def parent_edge(self, child: str) -> Edge | None:
-        """Return the first edge whose child is the frame, or None for a root."""
+        """Return the first edge whose child is the frame, None for a root."""
         return next((edge for edge in self.edges if edge.child == child), None)
 
     def roots(self) -> list[str]:
-        """Return the declared frames that are no edge's child, in declaration order."""
+        """Return the declared frames that are no child of an edge, in order of declaration."""
         children = {edge.child for edge in self.edges}
         return [frame for frame in self.frames if frame not in children]
 
     def children(self) -> dict[str, list[Edge]]:
-        """Return the edges of each parent, in the order of declaration."""
+        """Return the edges of each parent, in order of declaration."""
         table: dict[str, list[Edge]] = {}
         for edge in self.edges:
             table.setdefault(edge.parent, []).append(edge)
         return table
 
     def described_frames(self) -> set[str]:
-        """Return the frames that a URDF can hold.
+        """Return the frames that a URDF can contain.
 
-        The base, and what is below it over edges of known pose.
+        These are the base, and all frames below it through edges with known poses.
         """
-        known = [(edge.parent, edge.child) for edge in self.edges if edge.pose_known]
-        return below(children_of(known), self.base) if self.base is not None else set()
+        edges = [(edge.parent, edge.child) for edge in self.edges if edge.pose_known]
+        return below(children_of(edges), self.base) if self.base is not None else set()
 
     def below(self, frame: str) -> set[str]:
-        """Return the frame and every frame that hangs below it, over edges of any owner."""
+        """Return the frame and every frame below it, through edges of any owner."""
         return below(children_of((edge.parent, edge.child) for edge in self.edges), frame)

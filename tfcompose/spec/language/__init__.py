@@ -1,9 +1,7 @@
-"""The language of robot files, presets and calibration sections.
+"""The language of robot files, presets and calibration sections, as pydantic models.
 
-Pydantic models, and what merges files.
-
-The models are the one description of validation, JSON Schema and reference. ``overlay`` merges
-sources, ``validate`` makes a ``RobotSpec`` of one.
+Validation, JSON Schema and reference are all derived from the models. ``overlay`` merges sources.
+``validate`` turns a source into a ``RobotSpec``.
 """
 
 from tfcompose.spec.language.args import ArgSpec, ArgValue, BuildInputs, RosArguments
@@ -21,6 +19,8 @@ from tfcompose.spec.language.robot_overlays import (
     find_overlay,
     load_robot_overlay,
     overlay_files,
+    overlay_folder,
+    overlay_path,
     robots_with_overlay,
 )
 from tfcompose.spec.language.validate import (
@@ -47,6 +47,8 @@ __all__ = [
     "load_named",
     "load_robot_overlay",
     "overlay_files",
+    "overlay_folder",
+    "overlay_path",
     "profiles_in",
     "robots_with_overlay",
     "set_value",

@@ -1,4 +1,7 @@
-"""``args``: build-time values from the command line, the environment or the holder."""
+"""``args``.
+
+Build-time values from the command line, the environment or the including robot file.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -27,7 +30,7 @@ from tfcompose.spec.load import Path
 from tfcompose.spec.load.scalars import plain as scalar
 
 ArgType = Literal["bool", "int", "float", "string"]
-#: What a value of a type is called.
+#: Noun for a value of each type.
 _CALLED: dict[ArgType, str] = {
     "bool": "true or false",
     "int": "a whole number",
@@ -40,44 +43,44 @@ _CALLED: dict[ArgType, str] = {
 class ArgValue:
     """The value of an argument."""
 
-    #: From the command line and the environment it is a text.
+    #: The value, which is a string if it comes from the command line or the environment.
     value: Any
-    #: Where it comes from.
+    #: The place where the value is set.
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
 class RosArguments:
-    """ROS arguments for the whole robot, as ``--ros-args`` and a launch file around it give them.
+    """ROS arguments for the entire robot, from ``--ros-args`` or an enclosing launch file.
 
     They apply to nodes and topics, never to frames.
     """
 
-    #: The namespace above the robot's own, without slashes around; empty: none.
+    #: The namespace above the robot's own, without surrounding slashes; empty for none.
     namespace: str = ""
-    #: Rules that come before those of each process, as ``-r FROM:=TO``.
+    #: Remappings, as with ``-r FROM:=TO``. They precede the remappings of each process.
     remap: Mapping[str, str] = field(default_factory=dict)
-    #: Whether nodes follow /clock; None: as the robot file says.
+    #: Whether nodes follow /clock, None for the setting in the robot file.
     use_sim_time: bool | None = None
-    #: The log level of nodes whose process has none; None: ROS's default.
+    #: The log level of nodes whose process sets none, None for ROS's default.
     level: LogLevel | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class BuildInputs:
-    """What a robot file is built with: values of its arguments by name, and the environment."""
+    """The inputs of a build: values of arguments by name, environment, ROS arguments, and day."""
 
     args: Mapping[str, ArgValue] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
     ros: RosArguments = field(default_factory=RosArguments)
-    #: The day, in UTC, whose calibrations apply; None: those that still hold.
+    #: The day, in UTC, whose calibrations apply; None for calibrations without an end.
     day: date | None = None
 
 
 class ArgError(ValueError):
-    """A value is not one that the argument can have.
+    """A value is invalid for its argument.
 
-    ``code`` is the finding's, ``advice`` its help.
+    ``code`` is the code of the finding, and ``advice`` its help.
     """
 
     def __init__(self, code: str, message: str, advice: str = "") -> None:
@@ -118,15 +121,18 @@ class ArgSpec(Checked):
 
     @property
     def kind(self) -> ArgType:
-        """Its type, as declared, or as its default, first choice or bounds have it."""
+        """The type.
+
+        As declared, otherwise the type of the default, of the first choice or of the bounds.
+        """
         if self.type is not None:
             return self.type
-        known = [
+        values = [
             value
             for value in (self.default, *self.choices, self.min, self.max)
             if value is not None
         ]
-        kinds = [_kind(value) for value in known]
+        kinds = [_kind(value) for value in values]
         return (
             "float"
             if "float" in kinds[:1] or (kinds[:1] == ["int"] and "float" in kinds)
@@ -135,29 +141,28 @@ class ArgSpec(Checked):
 
     @property
     def alternatives(self) -> tuple[str, ...]:
-        """The values that are judged, as the command line gives them.
+        """The values to check, in the form of the command line.
 
-        All, or an integer's bounds and default.
-
-        Empty where there is neither a choice nor a bound.
+        These are all choices, or the bounds and the default of an integer. Empty for an argument
+        with neither choices nor bounds.
         """
         if self.choices:
             return tuple(as_given(choice) for choice in self.choices)
         if self.kind == "int" and (self.min is not None or self.max is not None):
             try:
-                known = {
+                texts = {
                     insertable_text(self.convert(value)): None
                     for value in (self.min, self.default, self.max)
                     if value is not None
                 }
             except ArgError:
                 return ()  # it is refused for that
-            return tuple(known)
+            return tuple(texts)
         return ("false", "true") if self.kind == "bool" else ()
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield choices, bounds and defaults of another type, and impossible defaults."""
+        """Yield choices, bounds and defaults of a different type, and impossible defaults."""
         yield from super().check(data)
         try:
             spec = cls.model_validate(
@@ -188,10 +193,10 @@ class ArgSpec(Checked):
             yield ("default",), invalid(error.code, str(error), error.advice)
 
     def value(self, raw: Any) -> Value:
-        """Return the value of an argument as expressions have it, from a raw value or the default.
+        """Return the value for expressions, from a raw value or the default.
 
         Raises:
-            ArgError: if the argument cannot have it.
+            ArgError: if the value is invalid for the argument.
         """
         value = self.convert(raw)
         if self.choices:
@@ -223,10 +228,10 @@ class ArgSpec(Checked):
         return ", ".join(filter(None, bounds))
 
     def convert(self, raw: Any) -> Value:
-        """Return the value as one of the argument's type.
+        """Return the value converted to the argument's type.
 
         Raises:
-            ArgError: if it is of another type.
+            ArgError: if it has a different type.
         """
         kind = self.kind
         raw = plain(raw)
@@ -254,18 +259,21 @@ class ArgSpec(Checked):
         raise ArgError("TF103", f"{format_value(raw)} is not {_CALLED[kind]}", advice)
 
     def _refuse_dimension(self, number: Quantity, raw: Any) -> None:
-        known = (self.default, *self.choices, self.min, self.max)
-        own = [
-            found.dimension
-            for known_value in known
-            if isinstance(known_value, str) and isinstance(found := _read(known_value), Quantity)
+        values = (self.default, *self.choices, self.min, self.max)
+        dimensions = [
+            quantity.dimension
+            for known_value in values
+            if isinstance(known_value, str)
+            and isinstance(quantity := _read(known_value), Quantity)
         ]
-        other = next((dimension for dimension in own if dimension != NUMBER), number.dimension)
-        if number.dimension not in {NUMBER, other}:
+        expected = next(
+            (dimension for dimension in dimensions if dimension != NUMBER), number.dimension
+        )
+        if number.dimension not in {NUMBER, expected}:
             raise ArgError(
                 "TF104",
                 f"{format_value(raw)} is {with_article(number.dimension)},"
-                f" not {with_article(other)}",
+                f" not {with_article(expected)}",
             )
 
 
@@ -290,7 +298,7 @@ def _kind(value: Any) -> ArgType:
 
 
 def _read(text: str) -> Any:
-    """Return what a text says: a number, a quantity, true or false, or itself."""
+    """Return the value of a text: a number, a quantity, True or False, otherwise the text."""
     try:
         value = scalar(text.strip())
         return value if isinstance(value, (bool, int, float)) else quantity(text)
@@ -299,7 +307,7 @@ def _read(text: str) -> Any:
 
 
 def as_given(value: Any) -> str:
-    """Return a value as the command line gives it."""
+    """Return a value in the form of the command line."""
     return format_value(value) if isinstance(value, bool) else str(value)
 
 
@@ -314,7 +322,7 @@ def _is_name(name: str) -> str:
 
 
 def full(value: Any) -> Any:
-    """Return an argument as a mapping; a value alone is its default."""
+    """Return an argument's declaration as a mapping. A plain value is the default."""
     return (
         value
         if isinstance(value, dict)

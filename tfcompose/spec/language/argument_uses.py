@@ -1,4 +1,7 @@
-"""Uses of arguments: the texts of a robot file that name them, and what each is for."""
+"""Uses of arguments.
+
+The strings of a robot file that name them, and the purpose of each string.
+"""
 
 from __future__ import annotations
 
@@ -14,34 +17,34 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path, Source
 
 HOLE = re.compile(r"\$\{([^{}]*)\}")
-#: What a process is given as it starts, by the key.
+#: Keys whose values a process receives at its start.
 _PLACES = ("env", "params", "remap")
 
 
 @dataclass(slots=True)
 class ArgumentUses:
-    """Where a robot file names its arguments and variables."""
+    """The places where a robot file uses its arguments and environment variables."""
 
-    #: Texts that a process is given at start, by process and place.
+    #: Strings that a process receives at its start, by process and place.
     texts: dict[tuple[str, str], str] = field(default_factory=dict)
-    #: Conditions of processes.
+    #: Conditions by process.
     conditions: dict[str, str] = field(default_factory=dict)
-    #: Arguments and variables that something else needs.
+    #: Arguments and variables that are also used in other places.
     fixed: set[str] = field(default_factory=set)
 
     def fix(self, text: str) -> None:
-        """Take what a text names as needed by something else."""
+        """Record that a string in another place uses its arguments and variables."""
         self.fixed |= names_of(text)
 
 
 def names_of(text: str) -> set[str]:
-    """Return the arguments and environment variables in a text: ``args.NAME``, ``env(NAME)``."""
-    found = (environment_in(hole.strip()) for hole in HOLE.findall(text))
-    return set(names_in(text)) | {f"env({variable[0]})" for variable in found if variable}
+    """Return arguments and environment variables in a text: ``args.NAME``, ``env(NAME)``."""
+    variables = (environment_in(hole.strip()) for hole in HOLE.findall(text))
+    return set(names_in(text)) | {f"env({variable[0]})" for variable in variables if variable}
 
 
 def uses_of(source: Source) -> ArgumentUses:
-    """Return where a robot file that is not validated yet names what it is built with."""
+    """Return the uses in a robot file that has not been validated yet."""
     uses = ArgumentUses()
     for path, text in _strings(source.data):
         place = None if path[:1] == ("profiles",) else _place(path, source.data)
@@ -55,7 +58,7 @@ def uses_of(source: Source) -> ArgumentUses:
 
 
 def _strings(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
-    """Yield the texts with expressions, keys as well, with their paths."""
+    """Yield strings with expressions, including keys, with their paths."""
     if isinstance(value, str) and "${" in value:
         yield path, value
     elif isinstance(value, (dict, list)):
@@ -66,7 +69,7 @@ def _strings(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
 
 
 def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the process and the place in it, or None where something else needs the value."""
+    """Return the process and the place in it, None for a string in any other place."""
     if len(path) < 3 or path[0] not in {  # noqa: PLR2004
         "processes",
         "containers",

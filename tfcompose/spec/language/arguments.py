@@ -1,4 +1,4 @@
-"""Analysis of arguments: the values that each can have, and what each decides."""
+"""Analysis of arguments: the possible values of each argument, and its effects."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ if TYPE_CHECKING:
 
     from tfcompose.spec.load import Source
 
-#: The values of arguments by name, as the command line gives them.
+#: Values of arguments by name, in the form of the command line.
 Combination = dict[str, str]
 
 MOST = 256
-#: An argument, by its number, and its value.
+#: The index of an argument, and a value.
 _Choice = tuple[int, str]
 
 
 def combinations(
     alternatives: Mapping[str, Sequence[str]], first: Combination
 ) -> list[Combination]:
-    """Return the combinations that are judged, ``first`` before all others."""
+    """Return the combinations to check, with ``first`` before all others."""
     names = list(alternatives)
     if math.prod(map(len, alternatives.values())) <= MOST:
         rows = list(product(*alternatives.values()))
     else:
         rows = _pairwise([alternatives[name] for name in names])
-    found = [dict(zip(names, row, strict=True)) for row in rows]
-    return [first, *(combination for combination in found if combination != first)][:MOST]
+    assignments = [dict(zip(names, row, strict=True)) for row in rows]
+    return [first, *(combination for combination in assignments if combination != first)][:MOST]
 
 
 def _pairwise(values: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
-    """Return rows that hold each pair of values of two arguments, found greedily.
+    """Return at most ``MOST`` rows that contain each pair of values of two arguments.
 
-    At most ``MOST``.
+    A greedy search finds the rows.
     """
     missing = {
         frozenset(((i, a), (j, b))): None
@@ -52,10 +52,10 @@ def _pairwise(values: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     while missing and len(rows) < MOST:
         chosen: dict[int, str] = dict(next(iter(missing)))
-        for index, known in enumerate(values):
+        for index, option in enumerate(values):
             if index not in chosen:
                 chosen[index] = max(
-                    known, key=lambda value: _new_pairs((index, value), chosen, missing)
+                    option, key=lambda value: _new_pairs((index, value), chosen, missing)
                 )
         for pair in subsets(sorted(chosen.items()), 2):
             missing.pop(frozenset(pair), None)
@@ -66,20 +66,20 @@ def _pairwise(values: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
 def _new_pairs(
     choice: _Choice, chosen: dict[int, str], missing: Mapping[frozenset[_Choice], None]
 ) -> int:
-    return sum(frozenset((choice, other)) in missing for other in chosen.items())
+    return sum(frozenset((choice, partner)) in missing for partner in chosen.items())
 
 
 def alternatives_of(
-    source: Source, inputs: BuildInputs, aside: Source
+    source: Source, inputs: BuildInputs, profiles: Source
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Return the possible values of used arguments that have no value yet.
+    """Return the possible values of used arguments that have no value yet, and their defaults.
 
-    Both are by name, as the command line gives them. ``aside`` is the file with its profiles,
-    which may use them too.
+    Both are by name, in the form of the command line. ``profiles`` is the file with its profiles,
+    which may also use the arguments.
     """
     idle = {
         name
-        for section, name in unused_variables(source.data, aside.data.get("profiles"))
+        for section, name in unused_variables(source.data, profiles.data.get("profiles"))
         if section == "args"
     }
     variables = Variables(source, inputs)
@@ -90,7 +90,7 @@ def alternatives_of(
         try:
             alternatives[name] = ArgSpec.model_validate(full(raw)).alternatives
         except ValidationError:
-            continue  # it is refused where the whole is read
+            continue  # validation of the file rejects it
     with_choices = {name: texts for name, texts in alternatives.items() if texts}
     return with_choices, {
         name: _first(variables.args[name], texts) for name, texts in with_choices.items()
@@ -98,7 +98,7 @@ def alternatives_of(
 
 
 def _first(value: Value | None, texts: tuple[str, ...]) -> str:
-    """Return the word that says the value, or the first of all."""
+    """Return the text for the value; if there is none, the first text."""
     return next(
         (text for text in texts if value is not None and text == insertable_text(value)), texts[0]
     )
@@ -107,10 +107,10 @@ def _first(value: Value | None, texts: tuple[str, ...]) -> str:
 def values_that_satisfy(
     expression: str, specs: Mapping[str, ArgSpec], values: Combination
 ) -> Iterator[Combination]:
-    """Yield values of the arguments in an expression that make it true.
+    """Yield values of the arguments in an expression that make the expression true.
 
-    ``values`` come first where they do. An argument without choices is tried with the constants
-    in the expression.
+    If ``values`` do so, they come first. For an argument without choices, the constants in the
+    expression are tried.
     """
     operands = parse(expression).operands.values()
     names = [operand.removeprefix("args.") for operand in operands if operand.startswith("args.")]
@@ -132,7 +132,7 @@ def values_that_satisfy(
 
 
 def _values_around(spec: ArgSpec, constants: Sequence[str]) -> Iterator[str]:
-    """Yield values of an argument on both sides of the constants."""
+    """Yield possible values of an argument: its alternatives, and values near the constants."""
     yield from spec.alternatives
     if not spec.choices:
         yield from constants

@@ -81,7 +81,7 @@ class ShapeSpec(Posed):
     sphere: Sphere | None = key(None, "a sphere", {"radius": 0.1})
     capsule: Capsule | None = key(
         None,
-        "a cylinder along z with round ends; in URDF a cylinder and two spheres, for every reader",
+        "a cylinder along z with round ends; written to URDF as a cylinder and two spheres",
         {"radius": 0.1, "length": 0.3},
     )
     mesh: Annotated[Mesh, short("uri", Mesh)] | None = key(
@@ -95,14 +95,14 @@ class ShapeSpec(Posed):
     )
     material: Annotated[MaterialSpec, short("name", MaterialSpec)] | None = key(
         None,
-        "its colour or texture; or the name of one, or of a colour",
+        "a colour or texture, or the name of a material or colour",
         {"rgba": [0.2, 0.4, 0.8, 1]},
         "blue",
     )
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also that no shape is given."""
+        """Also yield a fault if no shape is given."""
         yield from super().check(data)
         if not SHAPES & data.keys() and data.keys() <= cls.model_fields.keys():
             advice = f"one of {', '.join(sorted(SHAPES))}"
@@ -110,7 +110,7 @@ class ShapeSpec(Posed):
 
 
 class Tensor(Spec):
-    """A moment of inertia about the centre of mass."""
+    """The inertia tensor about the centre of mass."""
 
     ixx: Inertia = key(..., "the moment about x", 0.01)
     iyy: Inertia = key(..., "the moment about y", 0.01)
@@ -146,14 +146,14 @@ class InertialSpec(Rotated):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also that no mass is given."""
+        """Also yield a fault if no mass is given."""
         yield from super().check(data)
         if not MASSES & data.keys():
             advice = "for example mass: 10 kg, or density: 1 g/cm^3"
             yield (), invalid("TF102", "mass is missing", advice, on_key=True, keeps=True)
 
 
-#: A list of shapes, or one shape for a list of one.
+#: A list of shapes, or a single shape instead of a list.
 Shapes = Annotated[
     tuple[ShapeSpec, ...], BeforeValidator(as_list, ShapeSpec | tuple[ShapeSpec, ...])
 ]
@@ -174,7 +174,7 @@ class LinkSpec(MountKeys):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also a mass of which no distribution follows."""
+        """Also yield a mass from which no inertia can be derived."""
         yield from super().check(data)
         inertial = data.get("inertial")
         if not isinstance(inertial, dict) or not MASSES & inertial.keys():

@@ -1,19 +1,19 @@
-"""Calibration files: poses with a parent, a child and a place in the file.
+"""Calibration files: poses with parent, child and span.
 
-Every entry is the pose of its ``child`` in its ``parent``. Sources of the formats:
+Every entry is the pose of its ``child`` in its ``parent``. The formats and their sources:
 
 - autoware: ``sensors_calibration.yaml`` of a sensor kit, parent: {child: {x, y, z, roll, pitch,
-  yaw}}, metres and radians about fixed axes, as xacro puts them into a joint's origin.
-- easy_handeye2: its HandeyeCalibration message as YAML; the parent is robot_effector_frame for
-  eye_in_hand, else robot_base_frame, the child is tracking_base_frame. Its first version and
+  yaw}}, in metres and radians about fixed axes. xacro copies these to the origin of a joint.
+- easy_handeye2: its message HandeyeCalibration as YAML. The parent is robot_effector_frame for
+  eye_in_hand, otherwise robot_base_frame. The child is tracking_base_frame. The first version and
   easy_handeye wrote ``transformation``.
 - moveit: the launch file that "Save camera pose" writes, with one static_transform_publisher.
-- kalibr: camchain and imucam files. ``T_cam_imu`` takes points from the IMU to the camera, so it
-  is the pose of the IMU in the camera; ``T_cn_cnm1`` of cam1 takes points from cam0 to cam1: the
-  pose of cam0 in cam1.
-- transform_stamped: geometry_msgs/TransformStamped and tf2_msgs/TFMessage: the pose of
+- kalibr: camchain and imucam files. ``T_cam_imu`` maps points from the IMU to the camera, so it is
+  the pose of the IMU in the camera. ``T_cn_cnm1`` of cam1 maps points from cam0 to cam1, so it is
+  the pose of cam0 in cam1.
+- transform_stamped: geometry_msgs/TransformStamped and tf2_msgs/TFMessage, the pose of
   child_frame_id in frame_id.
-- matrix: four rows of four numbers that take points from the child to the parent; it has no names.
+- matrix: four rows of four numbers that map points from the child to the parent. It has no names.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ FORMATS: tuple[CalibrationFormat, ...] = get_args(CalibrationFormat)
 _LONGEST_NUMBER = 60
 _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 _EXACT = 1e-9
-#: What is wrong with a rotation itself, not with how it is written.
+#: Codes about a rotation itself, not about its notation.
 _NO_ROTATION = frozenset({"TF402", "TF403", "TF614"})
 
 
@@ -98,7 +98,7 @@ MatrixRows = Annotated[_Rows, InARow(4, "four rows of four numbers"), AfterValid
 
 
 class FileEntry(Spec):
-    """A mapping in a calibration file; what else it holds does not matter here."""
+    """A mapping in a calibration file. Other keys in it are ignored."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -138,13 +138,13 @@ class RecordedTransform(FileEntry):
 
     @property
     def pose(self) -> Pose:
-        """The pose that it is."""
+        """The pose of the transform."""
         xyz = (self.translation.x, self.translation.y, self.translation.z)
         return Pose(xyz, normalise(self.rotation.quat_xyzw))
 
 
 class RecordedHeader(FileEntry):
-    """std_msgs/Header, of which the frame matters."""
+    """std_msgs/Header. Only the frame is used."""
 
     frame_id: FrameName
 
@@ -158,7 +158,7 @@ class RecordedTransformStamped(FileEntry):
 
 
 class PoseXyzRpy(FileEntry):
-    """A position, and angles about fixed axes: as Autoware writes them, and as arguments."""
+    """Position and angles about fixed axes, from Autoware's files or from arguments."""
 
     x: CalibrationNumber
     y: CalibrationNumber
@@ -169,12 +169,12 @@ class PoseXyzRpy(FileEntry):
 
     @property
     def pose(self) -> Pose:
-        """The pose that it is."""
+        """The pose."""
         return Pose((self.x, self.y, self.z), quat_from_rpy(self.roll, self.pitch, self.yaw))
 
 
 class PoseXyzQuat(FileEntry):
-    """A position and a unit quaternion: as easy_handeye wrote them, and as arguments."""
+    """Position and unit quaternion, from easy_handeye's files or from arguments."""
 
     x: CalibrationNumber
     y: CalibrationNumber
@@ -186,7 +186,7 @@ class PoseXyzQuat(FileEntry):
 
     @property
     def pose(self) -> Pose:
-        """The pose that it is."""
+        """The pose."""
         return Pose((self.x, self.y, self.z), normalise((self.qx, self.qy, self.qz, self.qw)))
 
     @model_validator(mode="after")
@@ -202,7 +202,7 @@ class HandeyeTransform(FileEntry):
 
 
 class HandeyeTransformation(FileEntry):
-    """The same as its first version, and easy_handeye, wrote it."""
+    """HandeyeCalibration of easy_handeye2's first version and of easy_handeye."""
 
     transformation: PoseXyzQuat
 
@@ -215,32 +215,32 @@ class EyeInHand(FileEntry):
 
 
 class EyeOnBase(FileEntry):
-    """Parameters of a camera beside the robot."""
+    """Parameters of a camera next to the robot."""
 
     robot_base_frame: FrameName
     tracking_base_frame: FrameName
 
 
 class HandeyeKind(FileEntry):
-    """Which of the two it is, as easy_handeye2 has it."""
+    """The kind of calibration, as easy_handeye2 writes it."""
 
     calibration_type: Text
 
 
 class KalibrCamera(FileEntry):
-    """One camera of a camchain: the IMU, and the camera before it, as seen from this one."""
+    """A camera of a camchain: poses of the IMU and of the previous camera in this camera."""
 
     T_cam_imu: MatrixRows | None = None
     T_cn_cnm1: MatrixRows | None = None
 
 
 class MatrixFile(FileEntry):
-    """A file that is one matrix."""
+    """A file that consists of a matrix."""
 
     matrix: MatrixRows
 
 
-#: What a static_transform_publisher takes for a flag that is not given.
+#: Default values of static_transform_publisher's flags.
 _DEFAULTS: dict[type[PoseXyzQuat | PoseXyzRpy], dict[str, str]] = {
     PoseXyzQuat: dict.fromkeys(PoseXyzQuat.model_fields, "0") | {"qw": "1"},
     PoseXyzRpy: dict.fromkeys(PoseXyzRpy.model_fields, "0"),
@@ -249,53 +249,53 @@ _DEFAULTS: dict[type[PoseXyzQuat | PoseXyzRpy], dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class CalibrationEntry:
-    """The pose of ``child`` in ``parent``, by the names of the file.
+    """The pose of ``child`` in ``parent``, with the names from the file.
 
-    A matrix has no names.
+    An entry from a matrix has no names.
     """
 
     pose: Pose
     span: Span
     parent: str | None = None
     child: str | None = None
-    #: The key that holds it, if it matters.
+    #: The key of the entry, if the key matters.
     what: str = ""
 
     @property
     def name(self) -> str:
-        """The entry as people read it."""
+        """The entry for display."""
         return f"{self.parent} → {self.child}" if self.parent else "the matrix"
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFile:
-    """The contents of a calibration file."""
+    """The content of a calibration file."""
 
     file: str
     format: str
     entries: tuple[CalibrationEntry, ...]
-    #: Problems, at the span that names the file.
+    #: Findings about the file, at the span that names it.
     findings: tuple[Finding, ...]
 
 
 def unreadable(file: str, form: str, span: Span, findings: Iterable[Finding]) -> CalibrationFile:
-    """Return what a file says that cannot be read: nothing, and why."""
+    """Return an unreadable file: no entries, and findings with the reason."""
     return CalibrationFile(
         file, form, (), tuple(_inside("TF610", finding, file, span) for finding in findings)
     )
 
 
-def _inside(code: str, found: Finding, file: str, span: Span) -> Finding:
-    """Return a finding inside a calibration file as one at the place that names the file."""
-    is_exact = found.span is not None and found.span != Span(file)
-    notes = [Note("here", found.span), *found.notes] if is_exact else found.notes
-    return finding(code, f"{file}: {found.message}", span, help=found.help, notes=notes)
+def _inside(code: str, inner: Finding, file: str, span: Span) -> Finding:
+    """Move a finding inside a calibration file to the span that names the file."""
+    is_exact = inner.span is not None and inner.span != Span(file)
+    notes = [Note("here", inner.span), *inner.notes] if is_exact else inner.notes
+    return finding(code, f"{file}: {inner.message}", span, help=inner.help, notes=notes)
 
 
 def read_calibration(text: str, file: str, form: str, span: Span) -> CalibrationFile:
-    """Return what the text says, read in the format, which ``auto`` recognises.
+    """Return the content of the text in the given format; ``auto`` recognises the format.
 
-    ``span`` is where the file is named.
+    ``span`` is the place that names the file.
     """
     try:
         kind, documents = load_calibration(text, file)
@@ -307,16 +307,16 @@ def read_calibration(text: str, file: str, form: str, span: Span) -> Calibration
         return CalibrationFile(
             file, form, (), tuple(_inside("TF610", refusal, file, span) for refusal in wrong)
         )
-    known = _recognise(kind, documents)
-    chosen = known if form == "auto" else form
+    recognised = _recognise(kind, documents)
+    chosen = recognised if form == "auto" else form
     if chosen is None or not documents:
         what = "is empty" if not documents else "is in no known format"
         advice = f"formats: {', '.join(FORMATS)}; tfcompose help calibration shows them"
         return CalibrationFile(file, form, (), (_of_no_format(file, what, span, advice),))
-    if chosen != known and (kind != "yaml" or chosen == "moveit"):
+    if chosen != recognised and (kind != "yaml" or chosen == "moveit"):
         advice = (
-            f"leave format out; it reads like {known}"
-            if known
+            f"leave format out; it reads like {recognised}"
+            if recognised
             else f"formats: {', '.join(FORMATS)}"
         )
         return CalibrationFile(
@@ -331,7 +331,7 @@ def read_calibration(text: str, file: str, form: str, span: Span) -> Calibration
     return CalibrationFile(file, chosen, tuple(reader.entries), tuple(reader.findings))
 
 
-#: What calibration files say, and passwords do not.
+#: Words that calibration files contain and password files do not.
 _TYPICAL = re.compile(
     r"\b(?:T_cam_imu|T_cn_cnm1|transforms?|translation|rotation|quaternion|roll|matrix"
     r"|robot_base_frame)\b"
@@ -339,7 +339,7 @@ _TYPICAL = re.compile(
 
 
 def _without_text(findings: Sequence[Finding], text: str) -> list[Finding]:
-    """Return the findings about a text; of one that may be anything, they repeat nothing."""
+    """Return the findings. If the file may be of any kind, they repeat none of its text."""
     if _TYPICAL.search(text) or any(finding.code in {"TF001", "TF008"} for finding in findings):
         return list(findings)
     return [replace(findings[0], message="it cannot be read as a calibration", help="")]
@@ -354,7 +354,7 @@ _CAMERA = re.compile(r"cam(\d+)\Z")
 
 
 def _recognise(kind: Form, documents: tuple[Source, ...]) -> str | None:
-    """Return the format that the documents look like, or None."""
+    """Return the apparent format of the documents, or None."""
     if kind != "yaml":
         return {"rows": "matrix", "launch": "moveit"}[kind]
     data: Any = documents[0].data if documents else None
@@ -380,7 +380,7 @@ M = TypeVar("M", bound=FileEntry)
 class _FormatReader:
     """Reads documents in each of the formats.
 
-    An entry that is wrong is a finding, and the others are taken.
+    An invalid entry becomes a finding. Other entries are still read.
     """
 
     named_at: Span
@@ -389,19 +389,21 @@ class _FormatReader:
     findings: list[Finding] = field(default_factory=list)
 
     def model(self, model: type[M], data: Any, path: Path) -> M | None:
-        """Return what is at a path as the model, or None after noting what is wrong with it."""
+        """Return the data at a path as the model, None after recording what is wrong."""
         made, refusals = read(model, data)
         missing: set[Path] = set()
         for refusal in refusals:
             if refusal.code == "TF102" and refusal.path in missing:
-                continue  # one of several keys tells what the mapping should have been
+                continue  # one of the missing keys is enough to report
             missing.add(refusal.path)
-            at = (*path, *refusal.path[1:]) if model is MatrixFile else (*path, *refusal.path)
-            self._refuse(replace(refusal, path=at, on_key=False))
+            path_of_refusal = (
+                (*path, *refusal.path[1:]) if model is MatrixFile else (*path, *refusal.path)
+            )
+            self._refuse(replace(refusal, path=path_of_refusal, on_key=False))
         return None if refusals else made
 
     def refuse(self, path: Path, message: str, advice: str = "") -> None:
-        """Note what is wrong at a path."""
+        """Record a fault at a path."""
         self._refuse(SpecRefusal("TF610", path, message, advice))
 
     def _refuse(self, refusal: SpecRefusal) -> None:
@@ -435,7 +437,7 @@ class _FormatReader:
                     )
 
     def easy_handeye2(self, data: Any) -> Iterator[CalibrationEntry]:
-        """Yield the one entry of a hand-eye calibration."""
+        """Yield the entry of a hand-eye calibration."""
         path: Path = ("parameters",) if isinstance(data, dict) and "parameters" in data else ()
         names = self._handeye_names(data["parameters"] if path else data, path)
         if names is None:
@@ -450,7 +452,7 @@ class _FormatReader:
             yield self.entry(("transform",), new.transform.pose, *names)
 
     def _handeye_names(self, data: Any, path: Path) -> tuple[str, str] | None:
-        """Return the frames that it is about."""
+        """Return parent and child of the calibration."""
         is_in_hand = data.get("eye_on_hand") if isinstance(data, dict) else None
         if is_in_hand is None:
             kind = self.model(HandeyeKind, data, path)
@@ -464,7 +466,7 @@ class _FormatReader:
         return (base.robot_base_frame, base.tracking_base_frame) if base else None
 
     def transform_stamped(self, data: Any) -> Iterator[CalibrationEntry]:
-        """Yield the entries of a message, or of a message with several."""
+        """Yield the entries of a TransformStamped or a TFMessage."""
         is_list = isinstance(data, dict) and "transforms" in data
         messages = data["transforms"] if is_list else [data]
         if not isinstance(messages, list):
@@ -479,7 +481,7 @@ class _FormatReader:
                 )
 
     def kalibr(self, data: Any) -> Iterator[CalibrationEntry]:
-        """Yield what each camera sees: the IMU, and the camera before it."""
+        """Yield the poses of the IMU and of the previous camera in each camera."""
         for camera, values in data.items() if isinstance(data, dict) else ():
             number = _CAMERA.match(camera)
             if not number or not isinstance(values, dict):
@@ -496,13 +498,13 @@ class _FormatReader:
                     yield self.entry((camera, key), _pose_of(rows), camera, child, key)
 
     def matrix(self, data: Any) -> Iterator[CalibrationEntry]:
-        """Yield the one entry of a file that is a matrix."""
+        """Yield the entry of a file that consists of a matrix."""
         refusal = self.model(MatrixFile, {"matrix": data}, ())
         if refusal:
             yield self.entry((), _pose_of(refusal.matrix))
 
     def moveit(self, data: Any) -> Iterator[CalibrationEntry]:
-        """Yield an entry for each static_transform_publisher of a launch file."""
+        """Yield an entry for each static_transform_publisher in a launch file."""
         for index, row in enumerate(data):
             if any(flag.startswith("--") for flag in row):
                 yield from self._flags(index, row)
@@ -523,7 +525,7 @@ class _FormatReader:
             )
         else:
             names = dict(zip(PoseXyzQuat.model_fields, row[:7], strict=True))
-            where = {name: at for at, name in enumerate(names)}
+            where = {name: index for index, name in enumerate(names)}
             pose = self._arguments(PoseXyzQuat, names, index, where)
             if pose:
                 yield self.entry((index,), pose, row[7].lstrip("/"), row[8].lstrip("/"))
@@ -537,7 +539,7 @@ class _FormatReader:
                 (index,), f"--{missing[0]} is missing", "it must be a string, not a variable"
             )
             return
-        where = {flag[2:]: 2 * at + 1 for at, flag in enumerate(row[::2])}
+        where = {flag[2:]: 2 * index + 1 for index, flag in enumerate(row[::2])}
         model = PoseXyzQuat if {"qx", "qy", "qz", "qw"} & set(flags) else PoseXyzRpy
         pose = self._arguments(model, flags, index, where)
         if pose:
@@ -552,9 +554,9 @@ class _FormatReader:
         index: int,
         where: dict[str, int],
     ) -> Pose | None:
-        """Return the pose that arguments are.
+        """Return the pose from arguments, None after recording what is wrong.
 
-        ``where`` is each argument's place among the words.
+        ``where`` is the index of each argument in the command line.
         """
         made, refusals = read(model, _DEFAULTS[model] | flags)
         for refusal in refusals:

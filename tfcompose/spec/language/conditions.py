@@ -1,8 +1,8 @@
-"""``when`` and ``for``: which entries of a robot file there are, decided before the keys are read.
+"""``when`` and ``for``: conditions and loops of entries, evaluated before other keys are read.
 
-An entry whose ``when`` is false is not there, and nothing waits for it. One with ``for`` is there
-once for each value, under the names that its own name makes of them: ``camera_${i}``. The places
-of both are those of the entry as it is written.
+An entry whose ``when`` is false is removed, and no process waits for it. An entry with ``for`` is
+repeated for each value. Its name contains the variable, as in ``camera_${i}``. All resulting
+entries have the places of the original entry.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.expressions import Value
     from tfcompose.spec.load import Location, Path, Source
 
-#: The sections whose entries may have ``when`` and ``for``.
+#: Sections whose entries may have ``when`` and ``for``.
 SECTIONS = (
     "links",
     "joints",
@@ -54,16 +54,16 @@ class Unfolded:
     source: Source
     #: The values of loop variables, by (section, name).
     scopes: dict[Path, Mapping[str, Value]] = field(default_factory=dict)
-    #: Problems with conditions and loops.
+    #: Findings about conditions and loops.
     findings: list[Finding] = field(default_factory=list)
-    #: The paths of refused conditions and loops.
+    #: Paths of rejected conditions and loops.
     refused: list[Path] = field(default_factory=list)
-    #: Conditions that left entries out, as written, by (section, name).
+    #: Conditions that removed entries, as text, by (section, name).
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
 
 
 def unfold(source: Source, variables: Variables) -> Unfolded:
-    """Return the source without entries whose conditions fail, loops unrolled."""
+    """Return the source with loops unrolled and without entries whose conditions are false."""
     return _Unfolding(source, variables).unfold()
 
 
@@ -71,7 +71,7 @@ def holds(condition: Any, variables: Variables) -> bool:
     """Return whether a condition is true.
 
     Raises:
-        ExpressionError: if it is neither true nor false.
+        ExpressionError: if the result is not a boolean.
     """
     return _decide(condition, variables, {})
 
@@ -152,12 +152,12 @@ class _Unfolding:
     def _make_entries(
         self, path: Path, entry: dict[str, Any]
     ) -> Iterator[tuple[str, dict[str, Any], Location]]:
-        """Yield the names, the data and the places of what an entry stands for."""
+        """Yield name, data and location of each entry that an entry expands to."""
         section, template = str(path[0]), str(path[1])
         location = self.source.places.nearest(path)
         decided = {
             key for key in _KEYS if entry.get(key) is not None
-        }  # one without a value is refused later
+        }  # validation rejects a key without a value
         try:
             scopes = self._scopes(entry["for"], template) if "for" in decided else [{}]
         except ExpressionError as error:
@@ -187,7 +187,7 @@ class _Unfolding:
                         else format_value(entry["when"])
                     )
                     continue
-            except ExpressionError as error:  # with the entry there, nothing else is missing
+            except ExpressionError as error:  # keep the entry, so that no names are missing
                 self._refuse((*path, "when"), error)
             inner = {key: value for key, value in entry.items() if key not in decided}
             where = location.with_inside(
@@ -203,10 +203,10 @@ class _Unfolding:
             yield name, inner, where
 
     def _scopes(self, loops: Any, template: str) -> list[Scope]:
-        """Return the values of the loops' variables, for each turn.
+        """Return the values of the loop variables for each iteration.
 
         Raises:
-            ExpressionError: if they are no loops, or the name does not hold a variable.
+            ExpressionError: if the loops are invalid, or the name does not contain a variable.
         """
         if not isinstance(loops, dict) or not loops:
             raise ExpressionError(
@@ -248,22 +248,22 @@ class _Unfolding:
                 f"{format_value(value)} is not a list of items",
                 "a list, or ${range(3)}, or ${range(1, 4)}",
             )
-        found: list[Value] = []
+        kept: list[Value] = []
         for element in value:
             if isinstance(element, (dict, list)) or element is None:
                 raise ExpressionError(
                     f"{format_value(element)} cannot be an item of a loop", "a string, or a number"
                 )
             item = self.variables.value_in(element, {}) if isinstance(element, str) else element
-            found.append(
+            kept.append(
                 Quantity(item)
                 if isinstance(item, (int, float)) and not isinstance(item, bool)
                 else item
             )
-        return found
+        return kept
 
     def _fill_keys(self, value: Any, location: Location, scope: Scope) -> tuple[Any, Location]:
-        """Return the mapping with the loops' variables in the names of keys filled in."""
+        """Return the mapping with the values of loop variables inserted into its keys."""
         if not isinstance(value, dict):
             return value, location
         data: dict[str, Any] = {}
@@ -290,8 +290,8 @@ class _Unfolding:
             self.done.findings.append(refusal.finding(self.source))
 
     def _drop_waits(self, data: dict[str, Any]) -> None:
-        """Let nothing wait for what is not there only because of its condition or its loop."""
-        there = {
+        """Remove waits for entries that a condition or a loop has removed."""
+        present = {
             name
             for section in ("sensors", "containers", "processes")
             for name in data.get(section, ())
@@ -300,7 +300,7 @@ class _Unfolding:
 
         def is_gone(name: str) -> bool:
             return (
-                name not in there
+                name not in present
                 and not name.startswith(parts)
                 and any(pattern.fullmatch(name) for pattern in self.gone)
             )
@@ -312,10 +312,12 @@ class _Unfolding:
                 for step in inside:
                     around = around.get(step) if isinstance(around, dict) else None
                 waits = around.get("after") if isinstance(around, dict) else None
-                if isinstance(waits, dict) and any(is_gone(other) for other in waits):
+                if isinstance(waits, dict) and any(is_gone(awaited) for awaited in waits):
                     kept = around | {
                         "after": {
-                            other: what for other, what in waits.items() if not is_gone(other)
+                            awaited: what
+                            for awaited, what in waits.items()
+                            if not is_gone(awaited)
                         }
                     }
                     for step in reversed(inside):

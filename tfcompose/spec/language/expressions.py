@@ -1,13 +1,13 @@
 """``${…}`` in strings: arithmetic and conditions with quantities, vars, args and pi.
 
-The syntax is Python's, for ``and or not if else``, comparisons, ``+ - * /``, brackets and calls.
+The syntax follows Python for ``and or not if else``, comparisons, ``+ - * /``, brackets and calls.
 An operand is one of these::
 
     NUMBER [UNIT] | NAME | TEXT | "true" | "false" | "env" "(" NAME ["," DEFAULT] ")"
 
-TEXT is in single or double quotes, without escapes. DEFAULT is a text up to the bracket, as it
-stands there. The items of a loop are a list, or one ``range(first, end)``. No Python is run, and
-of the environment only what ``env`` names is read.
+TEXT is in single or double quotes, without escapes. DEFAULT is literal text up to the bracket. The
+items of a loop are a list, or a single ``range(first, end)``. No Python code is run. Only the
+environment variables that ``env`` names are read.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ DEEPEST = 20
 
 _NAME = r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*"
 _CONNECTIVES = r"(?:and|or|not|if|else)(?![\w.])"
-#: The units of two words, with spaces where people put them.
+#: Pattern of units with a slash, with optional spaces around it.
 _FRACTIONS = "|".join(rf"{unit.replace('/', ' */ *')}\b" for unit in UNITS if unit.count("/") == 1)
 _QUANTITY = re.compile(
     r"(?P<number>(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)"
@@ -68,7 +68,7 @@ _HOLE = re.compile(r"\$\{([^{}]*)\}")
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-#: A ``${…}`` in the brackets of another one, which is computed first.
+#: A ``${…}`` inside the brackets of another. It is computed first.
 _NESTED = re.compile(r"(\$\{\s*(?:frame|file)\([^(){}]*)\$\{([^{}]*)\}")
 _DEFERRED = re.compile(r"\$\{\s*(frame|file)\s*\(")
 _DEFERRED_EXAMPLES = {"frame": "base_link", "file": "maps/a.yaml"}
@@ -78,19 +78,19 @@ _WHERE = {
     "file": "it is allowed in run, params, remap and env, and in args and params of a xacro part",
 }
 
-#: What an expression takes for something else.
+#: Words with a fixed meaning in expressions, and that meaning.
 RESERVED = {
     "pi": "a number already",
     "params_file": "reserved for the arguments of a process",
     "build_dir": "reserved for the arguments of a process",
     **dict.fromkeys(("and", "or", "not", "if", "else", "true", "false"), "a word of conditions"),
 }
-#: What may be meant by a path that only a process knows.
+#: Advice for a path that only a process knows.
 A_FILE = "${file(PATH)} is the path of a file beside this one"
 
 
 class ExpressionError(ValueError):
-    """An expression cannot be computed; ``advice`` says what to write instead."""
+    """An expression cannot be computed; ``advice`` tells what to write instead."""
 
     def __init__(self, message: str, advice: str = "") -> None:
         super().__init__(message)
@@ -98,16 +98,16 @@ class ExpressionError(ValueError):
 
 
 class EnvironmentText(str):
-    """What a variable of the environment holds.
+    """The value of an environment variable.
 
-    A text among others, and alone the number or condition that it says.
+    Inside other text it is text. Alone, it is the number or boolean that it contains.
     """
 
     __slots__ = ()
 
     @property
     def value(self) -> Value:
-        """What it says."""
+        """The number or boolean in the text, otherwise the text."""
         if self in {"true", "false"}:
             return self == "true"
         try:
@@ -117,7 +117,7 @@ class EnvironmentText(str):
 
 
 def _fill_around(text: str, lookup: Callable[[str], Value], later: re.Pattern[str]) -> str:
-    """Return ``text`` with what is before, between and after the matches of ``later`` filled."""
+    """Return ``text`` with expressions computed, except matches of ``later``."""
     parts, end = [], 0
     for match in later.finditer(text):
         parts += [insertable_text(fill(text[end : match.start()], lookup, later)), match[0]]
@@ -126,12 +126,12 @@ def _fill_around(text: str, lookup: Callable[[str], Value], later: re.Pattern[st
 
 
 def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | None = None) -> Value:
-    """Return ``text`` with each ``${…}`` computed; one that is the whole text keeps its type.
+    """Return ``text`` with each ``${…}`` computed. If it is a single ``${…}``, the type is kept.
 
-    What matches ``later`` is left as it is. ``lookup`` is as for ``evaluate``.
+    Matches of ``later`` are left unchanged. ``lookup`` is as in ``evaluate``.
 
     Raises:
-        ExpressionError: if an expression is malformed, too long or not computable.
+        ExpressionError: if an expression is malformed, too long or cannot be computed.
     """
     while later and (nested := _NESTED.search(text)):
         text = (
@@ -168,16 +168,16 @@ def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | Non
 def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
     """Return the value of an expression.
 
-    ``lookup`` gives the value of a variable, and of ``env(NAME, default)``.
+    ``lookup`` returns the value of a variable or of ``env(NAME, default)``.
 
     Raises:
-        ExpressionError: if it is malformed, too long or not computable.
+        ExpressionError: if the expression is malformed, too long or cannot be computed.
     """
     expression = parse(text)
     try:
         value = _Evaluation(expression, lookup).value(expression.body)
         is_finite = not isinstance(value, Quantity) or math.isfinite(value.value)
-    except OverflowError:  # from whole numbers, which Python does not bound
+    except OverflowError:  # Python's integers are unbounded
         is_finite = False
     except RecursionError:
         raise ExpressionError(f"{expression} is too deep") from None
@@ -187,10 +187,10 @@ def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
 
 
 def items(text: str, lookup: Callable[[str], Value]) -> list[Value]:
-    """Return the whole numbers of a loop ``${range(end)}`` or ``${range(first, end)}``.
+    """Return the integers of a loop ``${range(end)}`` or ``${range(first, end)}``.
 
     Raises:
-        ExpressionError: if it is no such text, or its ends are no whole numbers, or more than
+        ExpressionError: if the text has another form, or the ends are not integers or more than
             ``MOST_ITEMS`` apart.
     """
     match = _HOLE.fullmatch(text.strip())
@@ -198,7 +198,7 @@ def items(text: str, lookup: Callable[[str], Value]) -> list[Value]:
     if not call:
         advice = "a list, or ${range(3)}, or ${range(1, 4)}"
         if match:
-            evaluate(match[1], lookup)  # it may hold an unknown name
+            evaluate(match[1], lookup)  # reports an unknown name
             advice = f"${{range({match[1].strip()})}}"
         raise ExpressionError(f"{text} is not a list of items", advice)
     ends = [evaluate(end, lookup) for end in call[1].split(",")]
@@ -222,7 +222,7 @@ MOST_ITEMS = 1000
 
 
 def environment_in(text: str) -> tuple[str, str | None] | None:
-    """Return the variable and default of ``env(NAME, default)``, or None for other texts."""
+    """Return variable and default of ``env(NAME, default)``, None for other text."""
     match = _ENV.fullmatch(text)
     if not match:
         return None
@@ -240,7 +240,7 @@ def environment_in(text: str) -> tuple[str, str | None] | None:
 def names_in(text: str) -> list[str]:
     """Return the names in the text's expressions, in order.
 
-    Variables, and also units and functions.
+    These are names of variables, units and functions.
     """
     return [
         name for hole in _HOLE.findall(text) for name in _DOTTED.findall(_QUOTED.sub("", hole))
@@ -252,7 +252,7 @@ _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 
 
 def insertable_text(value: Value) -> str:
-    """Return a value as it is written in a text: a quantity is its number, in SI units."""
+    """Return a value as it is inserted into text. A quantity is its number in SI units."""
     if isinstance(value, str):
         return str(value)
     if isinstance(value, bool):
@@ -269,7 +269,7 @@ _EXACT = 2**53
 class Expression:
     """An expression as Python's syntax tree, in which a name stands for each operand.
 
-    The same expression has the same tree whatever its units, texts and names are.
+    Expressions that differ only in units, texts and names have the same tree.
     """
 
     text: str
@@ -280,21 +280,24 @@ class Expression:
         return _quote(self.text)
 
     def operand(self, node: ast.expr) -> str:
-        """Return the number with its unit, text or name that a node is, or an empty string."""
+        """Return the operand that a node stands for, "" for other nodes.
+
+        An operand is a number with its unit, a text or a name.
+        """
         return self.operands[node.id] if isinstance(node, ast.Name) else ""
 
     def first(self, node: ast.expr) -> str:
-        """Return the first operand, or function, below a node."""
+        """Return the first operand or function below a node."""
         names = [below for below in ast.walk(node) if isinstance(below, ast.Name)]
         return self.operands[min(names, key=lambda name: name.col_offset).id]
 
 
 @lru_cache(maxsize=1024)
 def parse(text: str) -> Expression:
-    """Return the syntax tree of an expression, which is not computed.
+    """Return the syntax tree of an expression without computing it.
 
     Raises:
-        ExpressionError: if it is malformed or too long.
+        ExpressionError: if the expression is malformed or too long.
     """
     if len(text) > LONGEST_EXPRESSION:
         raise ExpressionError(
@@ -316,7 +319,7 @@ def parse(text: str) -> Expression:
 
 
 def _with_names(text: str) -> tuple[list[str], dict[str, str]]:
-    """Return the symbols of an expression with a name for each operand, and the operands."""
+    """Return the symbols of an expression, with a name for each operand, and the operands."""
     symbols: list[str] = []
     operands: dict[str, str] = {}
     end = 0
@@ -334,7 +337,7 @@ def _with_names(text: str) -> tuple[list[str], dict[str, str]]:
 
 
 def _refusal(text: str, symbols: Sequence[str], symbol: str) -> ExpressionError:
-    """Return why Python stops at a symbol, or, where that is empty, at the end."""
+    """Return why Python stops at a symbol; an empty symbol means the end."""
     quoted = _quote(text)
     if not symbols:
         return ExpressionError("an empty expression", "name a variable: ${name}")
@@ -355,18 +358,18 @@ def _quote(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Evaluation:
-    """Computes the nodes of one expression."""
+    """Computes the nodes of an expression."""
 
     expression: Expression
     lookup: Callable[[str], Value]
 
     def value(self, node: ast.expr) -> Value:
-        """Return the value of a node; all below it is computed, in order."""
+        """Return the value of a node, after computing all nodes below it in order."""
         match node:
             case ast.IfExp():
                 value, is_chosen = self.value(node.body), self.condition(node.test)
-                other = self.value(node.orelse)
-                return value if is_chosen else other
+                alternative = self.value(node.orelse)
+                return value if is_chosen else alternative
             case ast.BoolOp():
                 conditions = [self.condition(condition) for condition in node.values]
                 return all(conditions) if isinstance(node.op, ast.And) else any(conditions)
@@ -388,14 +391,14 @@ class _Evaluation:
         raise ExpressionError(f"{self.expression} cannot be computed")
 
     def condition(self, node: ast.expr) -> bool:
-        """Return the value of a node that has to be true or false."""
+        """Return the value of a node that must be a boolean."""
         value = _value_of_word(self.value(node))
         if isinstance(value, bool):
             return value
         raise self._refusal(node, value, "true or false")
 
     def number(self, node: ast.expr) -> Quantity:
-        """Return the value of a node that has to be a number."""
+        """Return the value of a node that must be a number."""
         return self._as_number(node, _value_of_word(self.value(node)))
 
     def _as_number(self, node: ast.expr, value: Value) -> Quantity:
@@ -459,9 +462,10 @@ class _Evaluation:
         if name in RESERVED:
             raise ExpressionError(f"{name} is {RESERVED[name]}", A_FILE)
         if name not in _FUNCTIONS:
-            known = ", ".join(_FUNCTIONS)
+            functions = ", ".join(_FUNCTIONS)
             raise ExpressionError(
-                f"unknown function {name}", did_you_mean(name, _FUNCTIONS, f"functions: {known}")
+                f"unknown function {name}",
+                did_you_mean(name, _FUNCTIONS, f"functions: {functions}"),
             )
         argument = self.number(node)
         accepted, compute, gives = _FUNCTIONS[name]
@@ -477,7 +481,7 @@ class _Evaluation:
 
 
 def constant(operand: str) -> str | None:
-    """Return what a command line gives for a literal, or None for names and units."""
+    """Return a literal in the form of the command line, None for names and units."""
     if operand[:1] in {"'", '"'}:
         return operand[1:-1]
     if (match := _QUANTITY.fullmatch(operand)) and not match["unit"]:

@@ -1,4 +1,4 @@
-"""The computers that a robot's processes run on, and how they are reached."""
+"""The computers on which a robot's processes run, and how to reach them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _without_port(value: str) -> str:
     return value
 
 
-#: What ssh takes; it must not read an option in it.
+#: An address for ssh. ssh must not mistake it for an option.
 SshAddress = Annotated[
     Text,
     Matches(r"([A-Za-z0-9_][A-Za-z0-9._-]*@)?[A-Za-z0-9:\[][A-Za-z0-9._:%\[\]-]*", "user@address"),
@@ -30,7 +30,7 @@ SshAddress = Annotated[
 ]
 
 
-#: It becomes part of the names of folders, units and nodes.
+#: A host's name, which becomes part of the names of folders, systemd units and nodes.
 HostName = Annotated[
     Text, Matches(r"[A-Za-z0-9][A-Za-z0-9._-]*", "a host's name: letters, digits, ., _ and -")
 ]

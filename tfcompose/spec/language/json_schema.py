@@ -1,6 +1,6 @@
-"""The language as JSON Schema (draft 2020-12), made from the models.
+"""The language as JSON Schema (draft 2020-12), generated from the models.
 
-Editors and check-jsonschema read it.
+Editors and check-jsonschema read the schemas.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.preset import PresetOption
     from tfcompose.spec.language.spec import Spec
 
-#: The languages of the core besides that of robot files.
+#: Languages of the core other than the language of robot files.
 _MODELS: dict[str, type[Spec]] = {"preset": PresetSpec, "node": NodePresetSpec}
 
 
@@ -46,60 +46,62 @@ def model_of(language: str) -> type[Spec]:
 def json_schema(
     language: str, presets: Mapping[str, PresetSpec], nodes: Iterable[str]
 ) -> dict[str, Any]:
-    """Return the schema of ``robot``, of an ``overlay`` of one, or of another language.
+    """Return the schema of ``robot``, of an ``overlay`` of a robot, or of another language.
 
-    The schemas of robots know the names and options of ``presets``, and the names of ``nodes``,
-    their presets.
+    The schema of a robot contains the names and options of ``presets``, and the names of
+    ``nodes``, which are presets of nodes.
     """
     is_robot = language in {"robot", "overlay"}
     root = model_of("robot" if is_robot else language)
-    own = _with_named_types(
+    definition = _with_named_types(
         root.model_json_schema(schema_generator=_Generator), {model for _, model in walk(root)}
     )
     if not is_robot:
-        own = _without_expressions(own)
-    definitions = own.pop("$defs", {})
+        definition = _without_expressions(definition)
+    definitions = definition.pop("$defs", {})
     for _, kind in walk(root):
-        schema = own if kind is root else definitions[kind.__name__]
+        schema = definition if kind is root else definitions[kind.__name__]
         for name, field in fields_of(kind).items():
             form = schema["properties"][name]
-            form.pop(
-                "to", None
-            )  # which processes a key applies to: JSON Schema would not warn, it would refuse
+            form.pop("to", None)  # JSON Schema cannot express which processes a key applies to
             form |= {"description": describe_key(field), "examples": _examples(field, form)}
         if kind is not root:
             schema["title"] = kind.__name__.removesuffix("Spec")
         _exclude(schema, getattr(kind, "EXCLUSIVE", ()), definitions)
     if language == "preset":
-        _overlaid(own, definitions)
+        _overlaid(definition, definitions)
     if is_robot:
-        own["patternProperties"] = {
+        definition["patternProperties"] = {
             "^x-": {"description": "your own anchors, which tfcompose does not read"}
         }
-        _add_codes(own["properties"]["rules"], definitions)
-        _add_presets(own, definitions, presets)
+        _add_codes(definition["properties"]["rules"], definitions)
+        _add_presets(definition, definitions, presets)
         for kind in ("NamedNode", "NodeSpec"):
             definitions[kind]["properties"]["preset"] |= {
                 "anyOf": [{"enum": sorted(nodes)}, _COMPUTED]
             }
-        _add_profiles(own, definitions, at="#/$defs/Robot" if language == "overlay" else "#")
+        _add_profiles(
+            definition, definitions, place="#/$defs/Robot" if language == "overlay" else "#"
+        )
     if language == "overlay":
-        definitions["Robot"], profile = own, definitions["Profile"]
+        definitions["Robot"], profile = definition, definitions["Profile"]
         properties = {
             name: schema for name, schema in profile["properties"].items() if name != "when"
         }
-        own = profile | {"properties": properties | {"profiles": own["properties"]["profiles"]}}
+        definition = profile | {
+            "properties": properties | {"profiles": definition["properties"]["profiles"]}
+        }
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"tfcompose {language}, version 1",
     }
-    return head | own | {"$defs": dict(sorted(definitions.items()))}
+    return head | definition | {"$defs": dict(sorted(definitions.items()))}
 
 
 def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict[str, Any]:
-    """Return the schema with every type that is no mapping where it is used.
+    """Return the schema with the definitions of types other than mappings inlined.
 
-    Beside ``$ref`` editors read nothing.
+    Editors ignore keys next to ``$ref``.
     """
     names = {kind.__name__ for kind in mappings}
     types = {
@@ -113,10 +115,10 @@ def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict
             return [inline(item) for item in value]
         if not isinstance(value, dict):
             return value
-        other = {key: inline(item) for key, item in value.items()}
+        inlined = {key: inline(item) for key, item in value.items()}
         if value.get("$ref") not in types:
-            return other
-        return dict(sorted((inline(types[other.pop("$ref")]) | other).items()))
+            return inlined
+        return dict(sorted((inline(types[inlined.pop("$ref")]) | inlined).items()))
 
     inside = {name: definition for name, definition in schema["$defs"].items() if name in names}
     made: dict[str, Any] = inline(schema | {"$defs": inside})
@@ -124,7 +126,7 @@ def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict
 
 
 def _without_expressions(schema: Any) -> Any:
-    """Return the schema without ``${…}``, which only robot files compute."""
+    """Return the schema without ``${…}``, because only robot files compute expressions."""
     if isinstance(schema, list):
         return [_without_expressions(item) for item in schema if item not in _EXPRESSIONS]
     if not isinstance(schema, dict):
@@ -141,18 +143,18 @@ _EXPRESSIONS = ({"type": "string", "pattern": EXPRESSION}, COMPUTED)
 
 
 class _Generator(GenerateJsonSchema):
-    """Leaves out what tells an editor nothing.
+    """Omits everything that is useless in an editor.
 
-    Titles, empty defaults, and null for what may be left out.
+    This includes titles, empty defaults, and null for optional keys.
     """
 
     def get_title_from_name(self, name: str) -> str:
-        """Return no title: the key says it."""
+        """Return no title, because the key is sufficient."""
         del name
         return ""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
-        """Return that no key has one."""
+        """Return False, because no key has a title."""
         del schema
         return False
 
@@ -169,27 +171,27 @@ class _Generator(GenerateJsonSchema):
         return {"description": inspect.getdoc(schema["cls"]), **made}
 
     def nullable_schema(self, schema: Any) -> dict[str, Any]:
-        """Return the schema without null, which only an overlay holds, to remove a key."""
+        """Return the schema without null, because only an overlay uses null, to remove a key."""
         return self.generate_inner(schema["schema"])
 
     def default_schema(self, schema: Any) -> dict[str, Any]:
-        """Return the schema with its default, where that is a plain value."""
+        """Return the schema with its default if that is a plain value."""
         made = super().default_schema(schema)
         if made.get("default") in (None, [], {}, "") or isinstance(made.get("default"), dict):
             made.pop("default", None)
         return made
 
     def literal_schema(self, schema: Any) -> dict[str, Any]:
-        """Return the choice alone."""
+        """Return only the choices."""
         return {"enum": list(schema["expected"])}
 
     def tagged_union_schema(self, schema: Any) -> dict[str, Any]:
-        """Return the schema of forms that differ by their value, not by a key."""
+        """Return the schema of alternatives that differ in their value, not in a key."""
         made = super().tagged_union_schema(schema)
         return {"anyOf": made["oneOf"]} if "oneOf" in made else made
 
     def tuple_schema(self, schema: Any) -> dict[str, Any]:
-        """Return the schema of a list; editors know ``items`` and not ``prefixItems``."""
+        """Return the schema of a list. Editors support ``items``, but not ``prefixItems``."""
         made = super().tuple_schema(schema)
         items = made.pop("prefixItems", None)
         return made | {"items": items[0]} if items else made
@@ -198,7 +200,7 @@ class _Generator(GenerateJsonSchema):
 def _examples(field: FieldInfo, form: dict[str, Any]) -> list[Any]:
     """Return the examples that an editor can insert.
 
-    Where a key has several forms it shows a mapping as one word.
+    If a key has several forms, mappings are omitted, because editors show them as a single word.
     """
     examples = examples_of(field)
     return (
@@ -211,14 +213,16 @@ def _examples(field: FieldInfo, form: dict[str, Any]) -> list[Any]:
 def _exclude(
     schema: dict[str, Any], groups: Iterable[frozenset[str]], definitions: dict[str, Any]
 ) -> None:
-    """Let a mapping hold only one key of each set."""
+    """Allow a mapping only one key of each group."""
     for keys in map(sorted, groups):
         name = f"OneOf_{'_'.join(keys)}"
         definitions[name] = {
             "allOf": [
                 {
                     "if": {"required": [key]},
-                    "then": {"properties": {other: False for other in keys if other != key}},
+                    "then": {
+                        "properties": {excluded: False for excluded in keys if excluded != key}
+                    },
                 }
                 for key in keys
             ]
@@ -226,14 +230,14 @@ def _exclude(
         schema.setdefault("allOf", []).append({"$ref": f"#/$defs/{name}"})
 
 
-def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
-    """Let a file that is merged over another omit required keys and remove with null."""
-    own["required"] = ["preset"]
+def _overlaid(definition: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """Allow an overlay to omit required keys, and to remove keys with null."""
+    definition["required"] = ["preset"]
     for model in (
-        own,
+        definition,
         *(definition for definition in definitions.values() if "properties" in definition),
     ):
-        if model is not own:
+        if model is not definition:
             model.pop("required", None)
         for name, schema in model["properties"].items():
             if name != "preset":
@@ -241,7 +245,7 @@ def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
 
 
 def _removable(schema: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of what may be null instead, and so may what is in it."""
+    """Return the schema with null as an alternative, also for the entries of a mapping."""
     about = {key: schema[key] for key in ("description", "examples", "default") if key in schema}
     form = {key: value for key, value in schema.items() if key not in about}
     if isinstance(form.get("additionalProperties"), dict) and form["additionalProperties"]:
@@ -250,7 +254,7 @@ def _removable(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_codes(rules: dict[str, Any], definitions: dict[str, Any]) -> None:
-    """Let ``rules`` know the codes of findings that can be switched."""
+    """Add the codes of findings whose severity can be set to ``rules``."""
     definitions["RuleSetting"] = rules.pop("additionalProperties")
     setting = {"$ref": "#/$defs/RuleSetting"}
     codes = [code for code in CATALOGUE.values() if code.can_be_allowed]
@@ -260,11 +264,12 @@ def _add_codes(rules: dict[str, Any], definitions: dict[str, Any]) -> None:
     rules["additionalProperties"] = False
 
 
-def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> None:
-    """Let a profile hold a robot file's keys but profiles, all optional and removable.
+def _add_profiles(definition: dict[str, Any], definitions: dict[str, Any], place: str) -> None:
+    """Allow profiles to contain all keys of a robot file except ``profiles``, all optional.
 
-    That goes for each mapping in it too, but not for those in lists, which a profile replaces as a
-    whole. ``at`` points to the schema of the robot, ``own``.
+    All these keys can also be removed with null. This includes nested mappings, but not mappings
+    in lists, because a profile replaces a complete list. ``place`` points to the schema
+    ``definition`` of the robot.
     """
     mappings = {
         f"#/$defs/{name}": schema for name, schema in definitions.items() if "properties" in schema
@@ -272,14 +277,14 @@ def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> 
     for pointer, schema in mappings.items():
         definitions[f"{pointer.rpartition('/')[2]}Overlay"] = _overlay(pointer, schema, mappings)
     robot = {
-        key: own[key]
+        key: definition[key]
         for key in ("type", "properties", "additionalProperties", "patternProperties")
     }
     robot["properties"] = {
-        name: schema for name, schema in own["properties"].items() if name != "profiles"
+        name: schema for name, schema in definition["properties"].items() if name != "profiles"
     }
     definitions["Profile"] = {"description": "What is merged over the robot."} | _overlay(
-        at, robot, mappings
+        place, robot, mappings
     )
     when = definitions["FrameSpec"]["properties"]["when"]
     about = (
@@ -287,11 +292,11 @@ def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> 
         " profiles"
     )
     definitions["Profile"]["properties"]["when"] = when | {"description": about}
-    own["properties"]["profiles"]["additionalProperties"] = {"$ref": "#/$defs/Profile"}
+    definition["properties"]["profiles"]["additionalProperties"] = {"$ref": "#/$defs/Profile"}
 
 
-def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict[str, Any]:
-    """Return the schema of a mapping that is merged over one at a pointer."""
+def _overlay(place: str, schema: dict[str, Any], mappings: Collection[str]) -> dict[str, Any]:
+    """Return the schema of a mapping that is merged over the mapping at ``place``."""
 
     def merge(value: Any) -> Any:
         if isinstance(value, list):
@@ -307,7 +312,7 @@ def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict
 
     def optional(name: str, value: dict[str, Any]) -> dict[str, Any]:
         again = merge(value)
-        form = {"$ref": f"{at}/properties/{name}"} if again == value else again
+        form = {"$ref": f"{place}/properties/{name}"} if again == value else again
         return _removable({"description": value["description"]} | form)
 
     made = {key: value for key, value in schema.items() if key != "required"}
@@ -316,17 +321,17 @@ def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict
     }
 
 
-#: A name in which something is computed.
+#: A name that contains an expression.
 _COMPUTED = {"pattern": r"\$\{"}
 
 
 def _add_presets(
-    own: dict[str, Any], definitions: dict[str, Any], presets: Mapping[str, PresetSpec]
+    definition: dict[str, Any], definitions: dict[str, Any], presets: Mapping[str, PresetSpec]
 ) -> None:
-    """Let ``preset`` know the presets, and ``options`` those of the one that is chosen.
+    """Add the names of presets to ``preset``, and the options of the chosen preset to ``options``.
 
-    A name that is not known can only be a user's own, from ``preset_path`` or an included file
-    that has one.
+    An unknown name can only be a user's preset, from ``preset_path`` or an included file with that
+    key.
     """
     sensor = definitions["SensorSpec"]
     sensor["properties"]["preset"] |= {
@@ -353,21 +358,21 @@ def _add_presets(
         ]
     }
     vendors = sorted({re.escape(name.partition("/")[0]) for name in presets})
-    known = {
+    schema = {
         "anyOf": [
             {"enum": sorted(presets)},
             {"pattern": f"^(?!({'|'.join(vendors)})/)"},
             _COMPUTED,
         ]
     }
-    own["if"] = {"anyOf": [{"required": ["preset_path"]}, {"required": ["include"]}]}
-    own["else"] = {
-        "properties": {"sensors": {"additionalProperties": {"properties": {"preset": known}}}},
+    definition["if"] = {"anyOf": [{"required": ["preset_path"]}, {"required": ["include"]}]}
+    definition["else"] = {
+        "properties": {"sensors": {"additionalProperties": {"properties": {"preset": schema}}}},
     }
 
 
 def _option(option: PresetOption) -> dict[str, Any]:
-    """Return the schema of one of a preset's options."""
+    """Return the schema of an option of a preset."""
     forms: dict[str, dict[str, Any]] = {
         "bool": {"type": "boolean"},
         "text": {"type": "string"},

@@ -1,6 +1,6 @@
 """Node presets and hand-written claims: the edges that a node publishes by itself.
 
-In a preset ``{map}``, ``{odom}`` … stand for the frames of the robot that have these roles.
+In a preset, ``{map}``, ``{odom}`` and others stand for the frames of the robot with these roles.
 """
 
 from __future__ import annotations
@@ -83,9 +83,9 @@ class NodePresetSpec(Spec):
     source: tuple[Fact, ...] = key(..., "the sources")
 
     def rate_in(self, params: dict[str, Any]) -> tuple[str, float]:
-        """Return the parameter that says how often the node sends, and that in Hz.
+        """Return the parameter that determines the node's rate, and that rate in Hz.
 
-        Empty, and infinitely often, where these parameters do not say it.
+        Empty and infinite if the parameters do not determine the rate.
         """
         period = params.get(self.period)
         if isinstance(period, (int, float)) and period > 0:

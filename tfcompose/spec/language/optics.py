@@ -27,7 +27,7 @@ _ANGLE, _LENGTH = Measure(ANGLE), Measure(LENGTH)
 
 
 def _about_zero(value: Any) -> Any:
-    """Return [from, to] for a whole angle."""
+    """Return [from, to] for a full angle."""
     if isinstance(value, list):
         return value
     angle = _ANGLE.read(value)
@@ -60,7 +60,7 @@ def _is_angle(angle: float) -> float:
 
 
 _FromTo = Annotated[tuple[Angle, Angle], InARow(2, "[-135 deg, 135 deg]")]
-#: [from, to], or a whole angle with its middle where the stream looks.
+#: [from, to], or a full angle centred on the viewing direction.
 AngleOfView = Annotated[
     _FromTo, AfterValidator(_has_order), BeforeValidator(_about_zero, Angle | _FromTo)
 ]
@@ -69,7 +69,7 @@ Pixels = Annotated[tuple[_Count, _Count], InARow(2, "[1280, 720]")]
 
 
 def _metres(value: Any) -> float | None:
-    """Return the length, or None for what is none: that is refused for itself."""
+    """Return the length in metres, None for an invalid value, which another check rejects."""
     try:
         return _LENGTH.read(value)
     except PydanticCustomError:
@@ -133,7 +133,7 @@ class OpticsSpec(Checked):
     )
     samples: _Count | None = key(None, "samples per scan or per revolution", 1081)
     rate: Rate | None = key(None, "the largest rate", "30 Hz")
-    shutter: Shutter | None = key(None, "of a camera")
+    shutter: Shutter | None = key(None, "the type of a camera's shutter")
     baseline: Size | None = key(None, "the distance of the two imagers of a stereo camera", "5 cm")
     active: Boolean | None = key(
         None,
@@ -148,7 +148,7 @@ class OpticsSpec(Checked):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also what cannot be true together."""
+        """Also yield values that contradict each other."""
         yield from super().check(data)
         elevations, channels = data.get("elevations"), data.get("channels")
         if (

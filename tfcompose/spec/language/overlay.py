@@ -1,11 +1,10 @@
-"""Robots from several files.
+"""Robots from several files: ``include``, profiles, overlays, and values from the command line.
 
-``include``, profiles, overlays, and single values from the command line.
-
-Mappings merge; scalars and lists replace; ``null`` in an overlay removes the key, and its default
-returns. Where a mapping holds one choice out of several keys (how a process runs, how a rotation
-is written), setting one in an overlay drops the others. ``include: [base.yaml]`` lays the file
-over what it includes; paths are relative to the file that writes them.
+Mappings are merged. Scalars and lists are replaced. ``null`` in an overlay removes a key, so that
+its default applies. Some mappings accept only one of several keys, for example for a rotation or
+for the way a process runs. If an overlay sets one of these keys, the others are dropped.
+``include: [base.yaml]`` merges the file over the files that it includes. Paths are relative to the
+file that contains them.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from tfcompose.spec.language.variables import NothingNewError, Variables
 from tfcompose.spec.load import DEEPEST, Location, Path, Source, Spans, find_path, load
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from tfcompose.spec.language.robot import RosSpec
 
@@ -44,38 +43,42 @@ def compose(
     inputs: BuildInputs = _NOTHING,
     read: Reader | None = None,
 ) -> Source:
-    """Return the robot with its named profiles laid over it, in order, then the overlays.
+    """Return the robot with profiles merged over it, in order, and then the overlays.
 
-    Without ``profiles``. With ``read``, which gives a file's text, a profile that is missing is
-    looked for in the parts.
-
-    Before the named ones come those whose own condition, ``when``, holds with the ``inputs`` and
-    the named ones. An overlay may bring profiles of its own.
+    The profiles are those in ``profiles``, preceded by profiles whose condition ``when`` is true
+    with the ``inputs`` and the named profiles. An overlay may define further profiles. The result
+    has no section ``profiles``. ``read`` returns the text of a file. If ``read`` is given, a
+    finding about a missing profile names parts that have it.
 
     Raises:
-        RejectedError: if a profile is not there.
+        RejectedError: if a profile does not exist.
     """
     for overlay in overlays:
         if "profiles" in overlay.data:
             only = {"profiles": overlay.data["profiles"]}
             source = lay_over(source, replace(overlay, data=only))
-    known = source.mapping("profiles")
-    wrong = _wrong_profiles(source)
-    missing = [name for name in dict.fromkeys(profiles) if name not in known]
-    unusable = [name for name in profiles if not isinstance(known.get(name), dict)]
+    profiles_by_name = source.mapping("profiles")
+    wrong = [*_wrong_profiles(source), *_choosing_overlays(source, overlays)]
+    missing = [name for name in dict.fromkeys(profiles) if name not in profiles_by_name]
+    unusable = [name for name in profiles if not isinstance(profiles_by_name.get(name), dict)]
     if unusable:
         unknown = (_unknown_profile(source, name, read) for name in missing)
         raise RejectedError([*source.findings, *wrong, *unknown])
     base = replace(without(source, "profiles"), findings=(*source.findings, *wrong))
     result = _lay_over_all(base, source, profiles, overlays)
-    if any(isinstance(profile, dict) and "when" in profile for profile in known.values()):
+    if any(
+        isinstance(profile, dict) and "when" in profile for profile in profiles_by_name.values()
+    ):
         holding, refused = _holding(source, result, inputs)
         profiles = [*(name for name in holding if name not in profiles), *profiles]
         result = _lay_over_all(
             replace(base, findings=(*base.findings, *refused)), source, profiles, overlays
         )
     return replace(
-        result, is_variant=bool(profiles or overlays), profiles=tuple(dict.fromkeys(profiles))
+        result,
+        is_variant=bool(profiles or overlays),
+        profiles=tuple(dict.fromkeys(profiles)),
+        overlays=tuple(overlay.file for overlay in overlays),
     )
 
 
@@ -92,10 +95,10 @@ def _lay_over_all(
 
 
 def _holding(
-    source: Source, others: Source, inputs: BuildInputs
+    source: Source, merged: Source, inputs: BuildInputs
 ) -> tuple[list[str], list[Finding]]:
-    """Return the profiles whose conditions hold, and what is wrong with conditions."""
-    variables = Variables(others, inputs)
+    """Return the profiles whose conditions are true, and findings about conditions."""
+    variables = Variables(merged, inputs)
     names: list[str] = []
     findings = []
     for name, profile in profiles_in(source).items():
@@ -126,10 +129,9 @@ def lay_over(
 ) -> Source:
     """Return ``base`` with ``overlay`` merged into it.
 
-    Each key remembers where it is from, and what it replaced.
-
-    With ``is_overlay`` a value that changes nothing is a finding. ``of`` is the language that both
-    are written in, by default that of robot files.
+    Each key keeps its place and the places of replaced values. With ``is_overlay``, a value that
+    changes nothing becomes a finding. ``of`` is the language of both files, by default that of
+    robot files.
     """
     if of is None:
         base, overlay = _with_full_args(base), _with_full_args(overlay)
@@ -154,7 +156,7 @@ def lay_over(
 def _with_full_args(source: Source) -> Source:
     """Return the source with each argument as a mapping.
 
-    A value alone, laid over one, is its default.
+    In an overlay, a plain value sets the default of an argument.
     """
     declared = source.data.get("args")
     if not isinstance(declared, dict) or all(
@@ -167,8 +169,8 @@ def _with_full_args(source: Source) -> Source:
     for name, value in declared.items():
         if not isinstance(value, dict) and value is not None:
             data[name] = {"default": value}
-            at = location.inside[name]
-            inside[name] = Location(at.span, {"default": at}, {"default": at})
+            inner = location.inside[name]
+            inside[name] = Location(inner.span, {"default": inner}, {"default": inner})
     places = {**source.places.inside, "args": location.with_inside(inside, keys)}
     return replace(
         source,
@@ -185,9 +187,9 @@ Part = tuple[dict[str, Any], Location]
 
 
 class _Merger:
-    """Merges in time proportional to the overlay and to the mappings that it reaches.
+    """Merges sources, in time proportional to the overlay and the mappings that it reaches.
 
-    Neither side is changed.
+    Neither source is modified.
     """
 
     def __init__(
@@ -201,7 +203,7 @@ class _Merger:
         self.findings: list[Finding] = []
 
     def merge(self, base: Part, overlay: Part, path: Path) -> Part:
-        """Return ``base`` with ``overlay`` laid over it."""
+        """Return ``base`` with ``overlay`` merged over it."""
         data, inside, keys = dict(base[0]), dict(base[1].inside), dict(base[1].keys)
         for choice in self.choices_at(path, overlay[0]):
             for dropped in choice & (data.keys() - overlay[0].keys()):
@@ -211,37 +213,34 @@ class _Merger:
                 self.remember((*path, new), inside[dropped])
                 _drop(dropped, data, inside, keys)
         for key, value in overlay[0].items():
-            at, location = (*path, key), overlay[1].inside[key]
+            inner, location = (*path, key), overlay[1].inside[key]
             if value is None and not is_for_later(path):
-                self.note_removal(key in data, overlay[1].keys[key], at)
+                self.note_removal(key in data, overlay[1].keys[key], inner)
                 _drop(key, data, inside, keys)
             elif isinstance(value, dict):
                 old = data.get(key)
                 if self.is_overlay and not value and isinstance(old, dict):
                     message = (
-                        f"{'.'.join(map(str, at))} is there already, and {{}} changes nothing"
+                        f"{'.'.join(map(str, inner))} is there already, and {{}} changes nothing"
                     )
                     self.findings.append(_idle(message, location, inside[key]))
                 if key in data and not isinstance(old, dict):
-                    self.remember(at, inside[key])
+                    self.remember(inner, inside[key])
                 under = (
                     (old, inside[key])
                     if isinstance(old, dict)
                     else ({}, location.with_inside({}, {}))
                 )
-                data[key], inside[key] = self.merge(under, (value, location), at)
+                data[key], inside[key] = self.merge(under, (value, location), inner)
                 keys[key] = overlay[1].keys[key]
             else:
                 if key in data:
-                    self.note(data[key], inside[key], value, location, at)
+                    self.note(data[key], inside[key], value, location, inner)
                 data[key], inside[key], keys[key] = value, location, overlay[1].keys[key]
         return data, base[1].with_inside(inside, keys)
 
     def choices_at(self, path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
-        """Return the choices that a mapping at the path makes.
-
-        Of each, it holds a key with a value.
-        """
+        """Return the groups of exclusive keys of which the mapping at the path sets a key."""
         return [
             keys
             for kind in mappings_at(self.of, path)
@@ -250,19 +249,19 @@ class _Merger:
         ]
 
     def note_removal(self, was_there: bool, key: Location, path: Path) -> None:  # noqa: FBT001 (the fact itself)
-        """Say so if nothing was removed."""
+        """Add a finding if the removed key did not exist."""
         if not was_there:
             message = f"{'.'.join(map(str, path))} is removed here, but does not exist"
             self.findings.append(finding("TF010", message, key.span))
 
     def remember(self, path: Path, old: Location) -> None:
-        """Remember that the value at the path was laid over the old one."""
+        """Record that the value at the path replaced the old value."""
         self.replaced[path] = (*self.above.get(path, ()), old.span, *self.below.get(path, ()))
 
     def note(
         self, old: Any, old_place: Location, new: Any, location: Location, path: Path
     ) -> None:
-        """Remember what is replaced, and say so if that changes nothing."""
+        """Record the replaced value. Add a finding if the new value is equal."""
         self.remember(path, old_place)
         if self.is_overlay and type(old) is type(new) and old == new and path != ("tfcompose",):
             message = f"{'.'.join(map(str, path))} is {_show_value(new)} already"
@@ -275,9 +274,9 @@ def _idle(message: str, location: Location, old: Location | None = None) -> Find
 
 
 def is_for_later(path: Path) -> bool:
-    """Return whether what stands there is merged over something only later.
+    """Return whether the value at the path belongs to a profile or a variant of a preset.
 
-    A profile, or a variant of a preset.
+    Such a value is merged only later.
     """
     return path[:1] == ("profiles",) or (path[:1] == ("options",) and path[2:3] == ("variants",))
 
@@ -291,7 +290,7 @@ def _show_value(value: Any) -> str:
     return "that list" if isinstance(value, list) else str(value)
 
 
-#: What all processes of a plan share; a part cannot have its own.
+#: Settings that all processes of a plan share. A part cannot have its own.
 _SHARED_SETTINGS = ("clock", "domain_id", "discovery", "rmw", "distro", "router")
 
 
@@ -303,24 +302,24 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
     settings: dict[str, Any],
     variables: dict[str, Any],
 ) -> tuple[Source, list[Finding]]:
-    """Return a robot file as a part, and a finding for each setting it cannot have there.
+    """Return a robot file as a part, and a finding for each setting that a part cannot have.
 
-    ``path`` leads to the part in its ``holder``. Laid over the part are the holder's settings
-    ``ros``, of which the part has some of its own, ``settings``, and the ``variables`` that it is
-    inputs.
+    ``path`` leads to the part in its ``holder``. The function merges three things over the part:
+    the holder's ROS settings ``ros``, the part's own ``settings``, and the ``variables`` from the
+    holder.
     """
     key = holder.key_span(path)
-    own = part.mapping("ros")
+    part_settings = part.mapping("ros")
     findings = []
     for name in _SHARED_SETTINGS:
-        wanted = getattr(ros, name)
-        if name in own and own[name] != wanted:
+        setting = getattr(ros, name)
+        if name in part_settings and part_settings[name] != setting:
             message = (
-                f"the part {path[-1]} has {name} {own[name]}, but the robot that includes it has"
-                f" {wanted}"
+                f"the part {path[-1]} has {name} {part_settings[name]}, but the robot that"
+                f" includes it has {setting}"
             )
             notes = [Note("set here", part.span_of(("ros", name)))]
-            advice = f"ros: {{{name}: {own[name]}}} here, or leave it out there"
+            advice = f"ros: {{{name}: {part_settings[name]}}} here, or leave it out there"
             findings.append(finding("TF312", message, key, notes=notes, help=advice))
     frames = _frame_names(part)
     settings = {
@@ -342,7 +341,7 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
 
 
 def _frame_names(source: Source) -> set[str]:
-    """Return every name that the file uses for a frame."""
+    """Return every frame name that the file uses."""
     names: set[str] = set()
     for section in ("frames", "links", "joints", "sensors"):
         for name, entry in source.mapping(section).items():
@@ -355,19 +354,19 @@ def _frame_names(source: Source) -> set[str]:
 
 
 def extended_preset(preset: Source) -> str | None:
-    """Return the name of the preset that a preset's file is merged over, or None."""
+    """Return the name of the preset that a preset's file extends, or None."""
     base = preset.data.get("extends")
     return base if isinstance(base, str) else None
 
 
 def profiles_in(source: Source) -> dict[str, dict[str, Any]]:
-    """Return the file's profiles by name, without those that cannot be laid over anything."""
+    """Return the file's profiles by name, without profiles that are not mappings."""
     profiles = source.mapping("profiles")
     return {name: value for name, value in profiles.items() if isinstance(value, dict)}
 
 
 def without(source: Source, key: str) -> Source:
-    """Return the source without one of its sections."""
+    """Return the source without the section."""
     if key not in source.data:
         return source
     location = source.places
@@ -378,7 +377,7 @@ def without(source: Source, key: str) -> Source:
 
 
 def _wrong_profiles(source: Source) -> list[Finding]:
-    """Return a finding for each profile that is no mapping, or that holds profiles itself."""
+    """Return a finding for each profile that is not a mapping or contains profiles itself."""
     profiles = source.data.get("profiles", {})
     if not isinstance(profiles, dict):
         advice = "for example profiles: {demo: {…}}"
@@ -413,10 +412,24 @@ def _wrong_profiles(source: Source) -> list[Finding]:
     return findings
 
 
+def _choosing_overlays(source: Source, overlays: Sequence[Source]) -> Iterator[Finding]:
+    """Yield a finding for each profile or overlay with the section ``overlays``.
+
+    The robot's overlay is chosen before profiles and overlays are merged.
+    """
+    parts = [
+        (f"the profile {name}", source.part(("profiles", name))) for name in profiles_in(source)
+    ]
+    for what, part in [*parts, *(("an overlay", overlay) for overlay in overlays)]:
+        if "overlays" in part.data:
+            message, span = f"{what} cannot choose overlays", part.key_span(("overlays",))
+            yield finding("TF023", message, span, help="write it in the robot file")
+
+
 def _unknown_profile(source: Source, name: str, read: Reader | None) -> Finding:
-    known = list(source.mapping("profiles"))
-    there = f"profiles: {', '.join(known)}" if known else "the file has no profiles"
-    advice = did_you_mean(name, known, there)
+    profiles = list(source.mapping("profiles"))
+    otherwise = f"profiles: {', '.join(profiles)}" if profiles else "the file has no profiles"
+    advice = did_you_mean(name, profiles, otherwise)
     if parts := _parts_with_profile(source, name, read) if read else []:
         entries = list_names((f"{part}: {{profiles: [{name}]}}" for part in parts), 3)
         advice = (
@@ -445,13 +458,13 @@ MOST_FILES = 50
 
 
 def with_includes(source: Source, read: Reader) -> Source:
-    """Return the source laid over the files that it includes, and they over theirs.
+    """Return the source merged over the files that it includes, recursively.
 
-    ``read`` gives a file's text.
+    ``read`` returns the text of a file.
 
     Raises:
-        RejectedError: if a file cannot be read or is not YAML, if files include each other, or are
-            too many.
+        RejectedError: if a file cannot be read or is not YAML, if files include each other, or if
+            there are too many files.
     """
     return _Includer(read).include(source, (source.file,))
 
@@ -483,10 +496,10 @@ class _Includer:
                 )
             included = self.include(self._load(file, span, source), (*chain, file))
             base = lay_over(base, included, is_overlay=False) if base else included
-        own = without(source, "include")
+        without_include = without(source, "include")
         if base is None:
-            return own
-        merged = lay_over(base, own, is_overlay=False)
+            return without_include
+        merged = lay_over(base, without_include, is_overlay=False)
         return replace(merged, file=source.file)
 
     def _names(self, source: Source) -> list[tuple[int, str]]:
@@ -497,13 +510,13 @@ class _Includer:
         ]
         if wrong:
             advice = "for example include: [base.yaml]"
-            found = finding(
+            refusal = finding(
                 "TF103",
                 "include takes the names of files",
                 source.span_of(("include",)),
                 help=advice,
             )
-            raise RejectedError([*source.findings, found])
+            raise RejectedError([*source.findings, refusal])
         return list(enumerate(names))
 
     def _load(self, file: str, span: Span, source: Source) -> Source:
@@ -516,20 +529,24 @@ class _Includer:
 
 
 def _with_include(finding: Finding, span: Span) -> Finding:
-    """Return the finding about an included file, with the place that includes it."""
+    """Return the finding about an included file, with a note about the place that includes it."""
     return replace(finding, notes=(*finding.notes, Note("included here", span)))
 
 
-def set_value(setting: str) -> Source:
-    """Return the overlay that ``PATH=VALUE`` means.
+#: Prefix of a setting's name in lists of overlays.
+SETTING = "--set "
 
-    The value is read as YAML: ``sensors.camera.xyz=[0.2, 0, 10 cm]``.
+
+def set_value(setting: str) -> Source:
+    """Return the overlay for ``PATH=VALUE``.
+
+    The value is YAML, as in ``sensors.camera.xyz=[0.2, 0, 10 cm]``.
 
     Raises:
-        RejectedError: if there is no ``=``, the value is not YAML, or the key is one that is read
-            before.
+        RejectedError: if there is no ``=``, the value is not YAML, or the key is read before
+            overlays are merged.
     """
-    span = Span(f"--set {setting}")
+    span = Span(f"{SETTING}{setting}")
     path_text, sign, value_text = setting.partition("=")
     path: Path = tuple(path_text.strip().split("."))
     if not sign or not all(path):

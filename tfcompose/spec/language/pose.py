@@ -1,8 +1,7 @@
 """Poses and edges as users write them.
 
-A position, one rotation out of five ways, a parent, and who publishes it.
-
-What is written stays as it is: ``rotation`` and ``Posed.xyz`` are what it means.
+An edge has a position, at most one of five forms of rotation, a parent and an owner. Models keep
+the values in their original form. ``rotation`` and ``Posed.xyz`` return their meaning.
 """
 
 import math
@@ -41,8 +40,7 @@ from tfcompose.spec.language.values import (
 )
 from tfcompose.spec.load import Path
 
-#: How far a quaternion's or a matrix row's length may be from 1: what four written decimals can
-#: do.
+#: Tolerance for the length of a quaternion or of a row of a matrix. It allows for four decimals.
 UNIT_TOLERANCE = 1e-3
 
 Direction = Literal["forward", "backward", "left", "right", "up", "down"]
@@ -60,7 +58,7 @@ def has_unit_length(quat_xyzw: Quaternion) -> Quaternion:
     """Return the quaternion.
 
     Raises:
-        PydanticCustomError: if its length is not nearly 1.
+        PydanticCustomError: if its length is not 1 within ``UNIT_TOLERANCE``.
     """
     length = norm(quat_xyzw)
     if abs(length - 1) <= UNIT_TOLERANCE:
@@ -75,10 +73,10 @@ def has_unit_length(quat_xyzw: Quaternion) -> Quaternion:
 
 
 def is_rotation(rows: Matrix) -> Matrix:
-    """Return the rows of a matrix.
+    """Return the rows of a rotation matrix.
 
     Raises:
-        PydanticCustomError: if they are not nearly those of a rotation.
+        PydanticCustomError: if they are not a rotation within ``UNIT_TOLERANCE``.
     """
     pairs = [(i, j) for i in range(3) for j in range(i + 1)]
     worst = max(
@@ -190,7 +188,7 @@ class Rotated(Checked):
 
     @property
     def rotation(self) -> Quaternion | None:
-        """The rotation as a unit quaternion x, y, z, w, or None where none is written."""
+        """The rotation as a unit quaternion x, y, z, w, None without a rotation."""
         if self.look is not None:
             return (
                 self.look.rotation
@@ -223,7 +221,7 @@ def _each_once(names: Texts) -> Texts:
     return names
 
 
-#: A parent, or several of which the first is nominal; either way a tuple.
+#: A parent, or several possible parents, of which the first is nominal; always a tuple.
 Parents = TypeAliasType("Parents", Annotated[OneOrMore, AfterValidator(_each_once)])
 
 
@@ -241,11 +239,11 @@ class EdgeKeys(Posed, Entry):
     owner: Text | None = key(None, "the process that publishes this edge", "base_drive")
     rate: Rate | None = key(None, "the rate at which the owner sends it", "50 Hz")
     static: Boolean | None = key(
-        None, "true: the owner, another process than tfcompose's, sends it on /tf_static", True
+        None, "true: the owner, not tfcompose, sends it on /tf_static", True
     )
 
 
-#: The formats of calibration files; ``tfcompose.spec.language.calibration`` says what each holds.
+#: Formats of calibration files, described in ``tfcompose.spec.language.calibration``.
 CalibrationFormat = Literal[
     "autoware", "easy_handeye2", "moveit", "kalibr", "matrix", "transform_stamped"
 ]
@@ -259,16 +257,18 @@ class CalibrationLimit(Spec):
 
 
 class Validity(Checked):
-    """The days on which a calibration holds, the first and the last one included."""
+    """The days on which a calibration is valid, including the first and the last."""
 
     from_: Day | None = Field(
         None,
         alias="from",
-        description="the first day; default: every day before",
+        description="the first day; default: valid from the beginning",
         examples=["2026-03-01"],
     )
     to: Day | None = key(
-        None, "the last day; default: it still holds; build and up use no others", "2026-06-30"
+        None,
+        "the last day; default: still valid; build and up use only files without it",
+        "2026-06-30",
     )
 
     @model_validator(mode="after")
@@ -279,25 +279,31 @@ class Validity(Checked):
         return self
 
     def has(self, day: date | None) -> bool:
-        """Return whether the day is one of them; without a day, whether they have no end."""
+        """Return whether the day is within the range.
+
+        Without a day, whether the range has no end.
+        """
         if day is None:
             return self.to is None
         return (self.from_ or day) <= day <= (self.to or day)
 
 
 class CalibrationFileSpec(Spec):
-    """A calibration file, and when it holds."""
+    """A calibration file, and the days on which it is valid."""
 
     file: Text = key(..., "the file, relative to this file", "calibration/sensors.yaml")
     valid: Validity | None = key(
         None,
-        "the days on which it holds, in UTC; rebag and verify --bag take the calibrations of the"
-        " recording's day",
+        "the days on which it is valid, in UTC; rebag and verify --bag take the calibrations of "
+        "the recording's day",
         {"from": "2026-03-01", "to": "2026-06-30"},
     )
 
     def holds(self, day: date | None) -> bool:
-        """Return whether it holds on the day, or without one, whether it still holds."""
+        """Return whether the file is valid on the day.
+
+        Without a day, whether it is still valid.
+        """
         return self.valid is None or self.valid.has(day)
 
 
@@ -321,7 +327,7 @@ class CalibrationSpec(CalibrationFileSpec):
 
 
 _Calibration = Annotated[CalibrationSpec, short("file", CalibrationSpec)]
-#: One calibration, or those of different days.
+#: A calibration, or several for different days.
 Calibrations = TypeAliasType(
     "Calibrations",
     Annotated[
@@ -340,24 +346,24 @@ CalibrationFiles = TypeAliasType(
 
 
 class MountKeys(EdgeKeys):
-    """The keys of what is bolted on, and so can be measured."""
+    """The keys of what is attached, and so can be measured."""
 
     calibration: Calibrations = key(
         (),
         "a file with the measured pose, or a list of files with the days on which each is valid;"
-        " the pose in this entry is the nominal one",
+        " the pose in this entry is the nominal one; []: no file, also none under calibrations",
         "calibration/hand_eye.yaml",
     )
     joint: Text | None = key(
         None, "the name of the fixed joint in URDF; default: PARENT_to_CHILD", "camera_mount_joint"
     )
 
-    #: What a pose without a parent would need.
+    #: Advice for a pose without a parent.
     NEEDS_PARENT: ClassVar[str] = "add the frame that it is in, parent: FRAME, or remove it"
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also the first key of a pose that has no parent, and so places nothing."""
+        """Also yield the first key of a pose without a parent, because it has no effect."""
         yield from super().check(data)
         name = next((name for name in data if name in _OF_A_POSE), None)
         if (

@@ -1,7 +1,7 @@
 """A sensor's preset: its frames, body and driver as data.
 
-In names ``{name}`` stands for the sensor's name, and a word of ``words`` for what it says there.
-In a driver's parameters and arguments there is also ``{prefix}``, the robot's frame prefix.
+In names, ``{name}`` stands for the sensor's name, and a key of ``words`` for the key's value. In a
+driver's parameters and arguments, ``{prefix}`` stands for the robot's frame prefix.
 """
 
 import re
@@ -32,7 +32,7 @@ from tfcompose.spec.load import Path
 
 UNKNOWN = "unknown"
 
-#: A position, or that it is not known: of that nothing is left.
+#: A position, or "unknown", which becomes None.
 KnownXyz = Annotated[
     Xyz | None,
     BeforeValidator(lambda value: None if value == UNKNOWN else value, Literal["unknown"] | Xyz),
@@ -129,7 +129,7 @@ class DriverClaim(Spec):
     about: Text = key("", "what it is")
 
 
-#: A parameter; a mapping says what its value depends on.
+#: A parameter; a mapping describes how its value depends on an option.
 Parameter = Annotated[
     Annotated[Chosen, Tag("[chosen]")] | Annotated[NoMapping, Tag("[value]")],
     Discriminator(lambda value: "[chosen]" if isinstance(value, dict) else "[value]"),
@@ -241,9 +241,9 @@ _TF = ("driver", "tfcompose")
 
 
 def wrong_names(preset: PresetSpec) -> Iterator[SpecRefusal]:
-    """Yield what the preset names and does not have: frames, options and their values.
+    """Yield names of frames, options and values that the preset uses but does not define.
 
-    Its frames are one tree.
+    Also yield faults of a preset whose frames do not form a single tree.
     """
     yield from _frames(preset)
     yield from _options(preset)
@@ -260,7 +260,7 @@ def wrong_names(preset: PresetSpec) -> Iterator[SpecRefusal]:
 
 
 def _processes(preset: PresetSpec) -> Iterator[tuple[Path, PresetProcess]]:
-    """Yield the processes of the driver, and where they are."""
+    """Yield the processes of the driver with their paths."""
     if preset.driver:
         yield ("driver",), preset.driver
         for name, process in preset.driver.also.items():
@@ -268,12 +268,12 @@ def _processes(preset: PresetSpec) -> Iterator[tuple[Path, PresetProcess]]:
 
 
 def _frames(preset: PresetSpec) -> Iterator[SpecRefusal]:
-    known = [preset.mount, *preset.frames]
+    frames = [preset.mount, *preset.frames]
     for path, name in _named_frames(preset):
-        if name not in known:
-            advice = did_you_mean(name, known, f"its frames: {', '.join(known)}")
+        if name not in frames:
+            advice = did_you_mean(name, frames, f"its frames: {', '.join(frames)}")
             yield SpecRefusal("TF606", path, f"{preset.model} has no frame {name}", advice)
-    for name in known:
+    for name in frames:
         for hole in _HOLE.findall(name):
             if hole != "name" and hole not in preset.words:
                 yield SpecRefusal(
@@ -294,7 +294,7 @@ def _frames(preset: PresetSpec) -> Iterator[SpecRefusal]:
 
 
 def _named_frames(preset: PresetSpec) -> Iterator[tuple[Path, str]]:
-    """Yield each frame that is named somewhere, and where."""
+    """Yield each use of a frame's name, with its path."""
     for name, frame in preset.frames.items():
         yield ("frames", name, "parent"), frame.parent
         if frame.by_driver:
@@ -314,24 +314,24 @@ def _named_frames(preset: PresetSpec) -> Iterator[tuple[Path, str]]:
 
 def _options(preset: PresetSpec) -> Iterator[SpecRefusal]:
     for name, option in preset.options.items():
-        known: tuple[str, ...] = (
+        variants: tuple[str, ...] = (
             tuple(option.variants) if option.type == "choice" else option.values
         )
         if option.type in {"choice", "set"}:
             chosen = option.default if option.type == "set" else [option.default]
             for value in chosen if isinstance(chosen, list) else [chosen]:
-                if value not in known:
+                if value not in variants:
                     message = f"the option {name} cannot be {value!r}"
                     yield SpecRefusal(
                         "TF606",
                         ("options", name),
                         message,
-                        f"one of: {', '.join(known)}",
+                        f"one of: {', '.join(variants)}",
                         on_key=True,
                     )
     for path, condition in _conditions(preset):
-        for name, wanted in condition.items():
-            yield from _condition(preset, (*path, name), wanted)
+        for name, condition_values in condition.items():
+            yield from _condition(preset, (*path, name), condition_values)
     for path, value in _chosen_options(preset):
         if value.option and value.option not in preset.options:
             advice = did_you_mean(value.option, preset.options)
@@ -340,7 +340,7 @@ def _options(preset: PresetSpec) -> Iterator[SpecRefusal]:
             )
 
 
-def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[SpecRefusal]:
+def _condition(preset: PresetSpec, path: Path, value: Any) -> Iterator[SpecRefusal]:
     name = str(path[-1])
     option = preset.options.get(name)
     if option is None and name != "tf":
@@ -349,13 +349,13 @@ def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[SpecRefu
             "TF606", path, f"{preset.model} has no option {name}", advice, on_key=True
         )
         return
-    known = (
+    by_type = (
         {"set": option.values, "choice": tuple(option.variants), "bool": (True, False)}
         if option
         else {}
     )
-    values: tuple[Any, ...] = known.get(option.type, ()) if option else _TF
-    for choice in wanted if isinstance(wanted, list) else [wanted]:
+    values: tuple[Any, ...] = by_type.get(option.type, ()) if option else _TF
+    for choice in value if isinstance(value, list) else [value]:
         if values and choice not in values:
             advice = f"one of: {', '.join(map(str, values))}"
             yield SpecRefusal("TF606", path, f"{name} is never {choice!r}", advice)
@@ -376,7 +376,7 @@ def _conditions(preset: PresetSpec) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 
 def _chosen_options(preset: PresetSpec) -> Iterator[tuple[Path, Chosen]]:
-    """Yield the parameters and arguments that depend on options, and where they are."""
+    """Yield the parameters and arguments that depend on options, with their paths."""
     for path, process in _processes(preset):
         for section, table in (("params", process.params), ("args", process.args)):
             for name, value in table.items():

@@ -1,4 +1,4 @@
-"""Processes as users describe them: what is started, or expected to run, and how."""
+"""Processes as users describe them: programs to start, or processes expected to run."""
 
 import re
 import shlex
@@ -84,13 +84,13 @@ def _insert(value: Any) -> Any:
     return insertable_text(value) if computed else value
 
 
-#: A string; a computed number is written as one.
+#: A string. A computed number is converted to a string.
 Word = Annotated[Text, BeforeValidator(_insert)]
 Words = tuple[Word, ...]
 
 
 def _split(value: Any) -> Any:
-    """Return the words of a text, as a shell has them."""
+    """Return the words of a text, split like a shell does."""
     try:
         return shlex.split(value) if isinstance(value, str) else value
     except ValueError as error:
@@ -101,12 +101,12 @@ def _split(value: Any) -> Any:
         ) from None
 
 
-#: A command before another one, as words or as a text of words.
+#: A wrapper command, as a list of words or a text.
 Prefix = Annotated[Words, BeforeValidator(_split, Text | Words)]
 
 
 def _arguments(value: Any) -> Any:
-    """Return a command's arguments as words; a launch file's are given by name."""
+    """Return a command's arguments as a list; arguments of a launch file are given by name."""
     if not isinstance(value, dict):
         return value
     wrong = [name for name, item in value.items() if isinstance(item, (dict, list))]
@@ -164,7 +164,7 @@ class Run(Checked):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[tuple[str], PydanticCustomError]]:
-        """Yield that a launch file is none of a package's executables."""
+        """Yield a fault if ``executable`` names a launch file."""
         yield from super().check(data)  # type: ignore[misc]
         file = data.get("executable")
         if isinstance(file, str) and re.search(r"[._]launch\.(py|xml|yaml|yml)$", file):
@@ -176,7 +176,7 @@ class Run(Checked):
 
     @property
     def is_startable(self) -> bool:
-        """Whether it says what to start."""
+        """Whether it defines a program to start."""
         return bool(self.argv or self.launch or (self.package and self.executable))
 
 
@@ -262,20 +262,22 @@ class ScheduleSpec(Checked):
     )
 
     def to_plan(self) -> Schedule:
-        """Return the schedule as the plan has it."""
+        """Return the schedule in the form of the plan."""
         usual: SchedulingPolicy = "fifo" if self.priority else "other"
         return Schedule(self.cpus, self.policy or usual, self.priority or 0)
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also a priority of a policy that has none, and one that is missing."""
+        """Also yield a priority for a policy without priorities, and a missing priority."""
         yield from super().check(data)
         policy, is_given = data.get("policy"), "priority" in data
         if is_given and policy in {"other", "batch", "idle"}:
             message = f"the policy {policy} has no priority"
             yield (
                 ("priority",),
-                invalid("TF107", message, "policy: fifo, or rr", on_key=True, other="policy"),
+                invalid(
+                    "TF107", message, "policy: fifo, or rr", on_key=True, conflicts_with="policy"
+                ),
             )
         elif not is_given and policy in {"fifo", "rr"}:
             yield (
@@ -299,7 +301,7 @@ class StopSpec(Spec):
     )
 
     def to_plan(self) -> StopRule:
-        """Return the rule as the plan has it."""
+        """Return the rule in the form of the plan."""
         return StopRule(self.signal, self.timeout, self.kill_timeout)
 
 
@@ -342,12 +344,12 @@ class ReadySpec(Checked):
     )
     time: Duration | None = key(None, "this long after its start", "2 s")
     timeout: Duration | None = key(
-        None, "when to stop waiting and report the actual state", "30 s"
+        None, "the longest time to wait; then tfcompose reports the actual state", "30 s"
     )
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also that nothing is waited for."""
+        """Also yield a fault if no condition is given."""
         yield from super().check(data)
         if not READY_WAYS & data.keys():
             advice = f"one of: {', '.join(sorted(READY_WAYS))}"
@@ -384,7 +386,9 @@ class NodeSpec(Spec):
         (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}]
     )
     params: Parameters = key({}, _PARAMS, {"use_sim_time": False})
-    lifecycle: LifecycleState | None = key(None, "the state to bring the lifecycle node into")
+    lifecycle: LifecycleState | None = key(
+        None, "the state that the guard brings the lifecycle node to"
+    )
 
 
 class NamedNode(Spec):
@@ -399,12 +403,12 @@ class NamedNode(Spec):
     preset: Text | None = key(None, _PRESET, "slam_toolbox")
 
 
-#: Whether components share an executor, and how many threads one has.
+#: Whether components share an executor; number of threads of an executor.
 Isolation = Literal["shared", "isolated"]
 Executor = Literal["single", "multi"]
 
 RUNNING = frozenset({"run", "simulate", "external", "component"})
-#: How the language writes what a row of the table holds, where that is not its type.
+#: Annotations for rows whose value in the language is not of the row's type.
 _ANNOTATIONS: dict[Any, Any] = {
     bool: Boolean,
     Seconds: Duration,
@@ -433,7 +437,7 @@ def _key(row: ProcessKey) -> Any:
 
 
 def _keys(rows: Iterable[ProcessKey]) -> dict[str, Any]:
-    """Return the keys of some rows, as ``create_model`` takes them."""
+    """Return the keys of the rows in the form that ``create_model`` requires."""
     return {row.name: (_annotation_of(row), _key(row)) for row in rows}
 
 
@@ -483,7 +487,7 @@ else:
     )
 
 
-#: A component: the package that has it, and its class.
+#: A component: its package and its class.
 Plugin = Annotated[
     Text,
     Matches(
@@ -536,7 +540,7 @@ class StartedSpec(Supervised):
         (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}], to=OF_NODES
     )
     lifecycle: LifecycleState | None = key(
-        None, "the state to bring its lifecycle node into", to=OF_NODES
+        None, "the state that the guard brings its lifecycle node to", to=OF_NODES
     )
     rate: Rate | None = key(
         None, "for the process joints only: the rate of joint states", "50 Hz", to=OWN
@@ -544,7 +548,7 @@ class StartedSpec(Supervised):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield a command in one string not marked for a shell, and the reverse."""
+        """Yield a string command without ``shell``, and ``shell`` without a string command."""
         yield from super().check(data)
         run, shell = data.get("run"), data.get("shell") is True
         if isinstance(run, str) and not shell:
@@ -595,9 +599,9 @@ class ProcessSpec(StartedSpec, Entry):
 
     nodes: dict[NodeName, NodeSpec] = key(
         {},
-        "the nodes of a process by name, if there are several, or one that keeps its program's "
-        "name; params of the process apply to all of its nodes, also to unlisted ones; for a "
-        "single node, use node, params and lifecycle",
+        "the nodes of a process by name, for several nodes, or for one whose name tfcompose must "
+        "not change; the process's params apply to all its nodes, listed or not; for a single "
+        "node, use node, params and lifecycle",
         {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
         to=NOT_OWN,
     )
@@ -605,10 +609,13 @@ class ProcessSpec(StartedSpec, Entry):
 
 @cache
 def keys_of(way: Way) -> frozenset[str]:
-    """Return the keys that apply to processes that run so, but for those that say how it runs."""
-    known = fields_of(ProcessSpec).items()
+    """Return the keys that apply to processes that run in this way.
+
+    Keys that define how a process runs are not included.
+    """
+    field = fields_of(ProcessSpec).items()
     return (
-        frozenset(name for name, field in known if way in more_of(field, "to", ("run",))) - RUNNING
+        frozenset(name for name, field in field if way in more_of(field, "to", ("run",))) - RUNNING
     )
 
 
@@ -622,7 +629,7 @@ class ContainerSpec(Supervised, Entry):
         "shared",
         "isolated: one executor for each component; shared: one executor for all",
     )
-    executor: Executor = key("single", "the threads of an executor")
+    executor: Executor = key("single", "the number of threads of each executor")
     package: Text = key(
         "rclcpp_components", "the package of the container's executable", "my_containers"
     )
@@ -648,7 +655,7 @@ class ContainerSpec(Supervised, Entry):
 class DriverSpec(StartedSpec):
     """Changes to the preset's driver.
 
-    Or the name of the process that drives this sensor, or none.
+    Instead of this mapping: the name of the process that drives this sensor, or none.
     """
 
     process: Text | None = key(None, "the process that drives this sensor, or none", "camera_rig")

@@ -1,10 +1,9 @@
-"""From plain data to a model.
+"""Reading plain data into a model: all faults of the data, and a model of the valid rest.
 
-Everything that is refused, in this project's words, and a model of the rest.
-
-pydantic gives all or nothing. So what it refuses is taken out of the data and the rest is read
-again; each turn finds everything at once, and what is refused then only because something is gone
-is not reported. Most files with faults take two turns, and none takes more than it has levels.
+pydantic returns either a complete model or errors. So this module removes rejected values from the
+data and validates the rest again. Each pass finds all faults at once. A later pass may reject a
+value only because another value was removed; such faults are not reported. Most faulty files need
+two passes. The number of passes is limited by the depth of the file.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from pydantic import ValidationError
 from tfcompose.foundation.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
 from tfcompose.foundation.tool import absent
 from tfcompose.foundation.units import format_value
-from tfcompose.spec.language.habits import habit, usual_value
+from tfcompose.spec.language.key_hints import habit, usual_value
 from tfcompose.spec.language.spec import FIRST, fields_of, kinds_of, mapping_at, value_at
 
 if TYPE_CHECKING:
@@ -32,37 +31,41 @@ if TYPE_CHECKING:
 
 M = TypeVar("M", bound="Spec")
 
-#: How often the rest is read again at most: no file is nested deeper.
+#: Maximum number of passes. No file is nested deeper.
 _MAX_ATTEMPTS = 50
 
 
 @dataclass(frozen=True, slots=True)
 class SpecRefusal:
-    """One value or key that the language does not take."""
+    """A value or key that the language does not accept."""
 
     code: str
-    #: Its path in the file.
+    #: The path of the value or key in the file.
     path: Path
     message: str
     help: str = ""
-    #: Whether the key is wrong instead of its value.
+    #: Whether the key is wrong, rather than its value.
     on_key: bool = False
-    #: The key that it conflicts with.
-    other: Path | None = None
-    #: The key or string that belongs there, if there is only one.
+    #: The path of a conflicting key.
+    conflicts_with: Path | None = None
+    #: The correct key or string, if there is only one candidate.
     instead: str | None = None
 
     def finding(self, source: Source) -> Finding:
-        """Return the finding at its place in the source."""
+        """Return the finding at the refusal's place in the source."""
         span = source.key_span(self.path) if self.on_key else source.span_of(self.path)
-        notes = [Note("the other one", source.key_span(self.other))] if self.other else []
+        notes = (
+            [Note("the other one", source.key_span(self.conflicts_with))]
+            if self.conflicts_with
+            else []
+        )
         edits = [Edit(span, self.instead)] if self.instead is not None else []
         replacement = (
             _overlay_advice(source, self.path)
             if self.code == "TF102" and source.is_variant
             else ""
         )
-        if replacement:  # one finding, whatever it lacks
+        if replacement:  # a single finding for all missing keys
             return finding(
                 "TF102",
                 f"{self.path[-1]} does not exist, and is not complete as a new entry",
@@ -74,7 +77,7 @@ class SpecRefusal:
 
 
 def _overlay_advice(source: Source, path: Path) -> str:
-    """Return advice for an overlay's new entry that probably means an existing one."""
+    """Return advice for a new entry in an overlay whose name resembles an existing entry."""
     around = source.places.get(path[:-1])
     names = list(around.keys) if around else []
     before = names[: names.index(path[-1])] if path and path[-1] in names else []
@@ -84,10 +87,11 @@ def _overlay_advice(source: Source, path: Path) -> str:
 def read(
     model: type[M], data: Any, already: Iterable[Path] = ()
 ) -> tuple[M | None, list[SpecRefusal]]:
-    """Return the model of the data without what is refused, and the refusals.
+    """Return the model of the data without rejected values, and the refusals.
 
-    ``already`` are paths of what was refused before: it is left out, and so is what is refused
-    only because of it. The model is None where a required key of the whole is missing.
+    ``already`` are paths of values that were rejected before. They are left out, and faults that
+    only follow from them are not reported. The model is None if a required key at the top is
+    missing.
     """
     refusals: list[SpecRefusal] = []
     gone: set[Path] = set()
@@ -122,17 +126,14 @@ def read(
 
 
 def _culprit(path: Path, error: ErrorDetails) -> Path:
-    """Return the path of what has to go.
-
-    Of a key that is missing, the mapping that it is missing in.
-    """
+    """Return the path to remove: for a missing key, the path of the mapping that lacks it."""
     return path[:-1] if error["type"] == "missing" else path
 
 
 def _path_of(loc: tuple[int | str, ...], data: Any) -> Path:
     """Return the path in the file.
 
-    Pydantic's has labels of unions, and indexes where one item stands for a list.
+    pydantic's path also has labels of unions, and indices where a single item replaces a list.
     """
     steps: list[int | str] = []
     for step in loc:
@@ -150,11 +151,10 @@ def _path_of(loc: tuple[int | str, ...], data: Any) -> Path:
 
 
 def _without(data: Any, paths: Iterable[Path], gone: set[Path]) -> Any:
-    """Return the data without what is at the paths, or None if that is all of it.
+    """Return the data without the values at the paths, None if nothing is left.
 
-    The paths are added to ``gone``.
-
-    A list goes with one of its items. Nothing that is given changes.
+    Removed paths are added to ``gone``. If an item of a list is removed, the entire list is
+    removed. The given data are not modified.
     """
     tree: dict[Any, Any] = {}
     for path in paths:
@@ -172,12 +172,12 @@ def _without(data: Any, paths: Iterable[Path], gone: set[Path]) -> Any:
     return _prune(data, tree) if tree else data
 
 
-#: Marks what goes as a whole.
+#: Marks a value to remove completely.
 _ALL: Any = {None: None}
 
 
 def _existing(data: Any, path: Path) -> Path:
-    """Return the path as far as it leads to something of its own.
+    """Return the longest part of the path that ends at an existing key of a mapping.
 
     Short forms and items of lists have no keys.
     """
@@ -206,7 +206,7 @@ def _prune(data: Any, tree: dict[Any, Any]) -> Any:
 def _refusals(
     model: type[Spec], errors: list[tuple[Path, ErrorDetails]], data: Any
 ) -> list[SpecRefusal]:
-    """Return what pydantic refused in one turn, in this project's words."""
+    """Return what pydantic rejected in a pass, in the words of this project."""
     unknown = [path for path, error in errors if error["type"] in UNKNOWN_KEYS]
     slips = Counter((path[:-1], _slip(model, path)) for path in unknown)
     refusals = []
@@ -218,29 +218,29 @@ def _refusals(
     return refusals
 
 
-#: The kinds of errors for a key that a model, or a dataclass, does not have.
+#: pydantic's error types for an unknown key of a model or dataclass.
 UNKNOWN_KEYS = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
 
 
 def _slip(model: type[Spec], path: Path) -> str | None:
-    known = mapping_at(model, path[:-1])
-    return slip_of(str(path[-1]), fields_of(known))
+    model_keys = mapping_at(model, path[:-1])
+    return slip_of(str(path[-1]), fields_of(model_keys))
 
 
 def _unknown_key(
     model: type[Spec], path: Path, data: Any, slips: Counter[tuple[Path, str | None]]
 ) -> SpecRefusal:
-    """Return the refusal of a key.
+    """Return the refusal of an unknown key.
 
-    One that is there already, or is meant by two, is not proposed.
+    A similar key is not proposed if it is already set or similar to several unknown keys.
     """
     holder = mapping_at(model, path[:-1])
-    name, known = str(path[-1]), list(fields_of(holder))
+    name, keys = str(path[-1]), list(fields_of(holder))
     slip = _slip(model, path)
     around = data
     for step in path[:-1]:
         around = around[step]
-    usual = habit(name, known, around.get(path[-1])) or getattr(holder, "HABITS", {}).get(name, "")
+    usual = habit(name, keys, around.get(path[-1])) or getattr(holder, "HABITS", {}).get(name, "")
     if not slip and not usual and _is_a_section(model, path):
         message = f"{path[1]} is a section of its own, not one of {path[0]}"
         return SpecRefusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
@@ -249,16 +249,16 @@ def _unknown_key(
         (absent(name, "key") if len(path) == 1 else "")
         or usual
         or (f"did you mean {slip}?" if slip else "")
-        or _indentation_advice(path, around, known)
+        or _indentation_advice(path, around, keys)
     )
     if not advice:
-        listing = f"known here: {', '.join(known)}"
+        listing = f"known here: {', '.join(keys)}"
         option = (
             f"an option of its preset goes under options: {{{name}: …}}; "
-            if "options" in known
+            if "options" in keys
             else ""
         )
-        advice = did_you_mean(name, known, option + listing)
+        advice = did_you_mean(name, keys, option + listing)
     return SpecRefusal(
         "TF101",
         path,
@@ -270,17 +270,20 @@ def _unknown_key(
 
 
 def _is_a_section(model: type[Spec], path: Path) -> bool:
-    """Return whether an entry of a section has the name of a section: it is indented too far."""
+    """Return whether an entry is a section that is indented too far.
+
+    Such an entry has the name of a section.
+    """
     return len(path) == 3 and path[1] in fields_of(model) and path[0] != "profiles"  # noqa: PLR2004 (section, entry, key)
 
 
-def _indentation_advice(path: Path, around: dict[str, Any], known: list[str]) -> str:
-    """Return the help for a key that follows a known one without a value.
+def _indentation_advice(path: Path, around: dict[str, Any], keys: list[str]) -> str:
+    """Return the help for an unknown key that follows a known key without a value.
 
-    It probably belongs to that.
+    The unknown key probably belongs below the known key.
     """
     before = list(around)[: [*around].index(str(path[-1]))]
-    owner = next((name for name in reversed(before) if name in known), "")
+    owner = next((name for name in reversed(before) if name in keys), "")
     return f"indent it, if it belongs to {owner}" if owner and around[owner] is None else ""
 
 
@@ -288,7 +291,9 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> SpecRefusal:
     kind, value = error["type"], error["input"]
     context, on_key = error.get("ctx", {}), "[key]" in error["loc"]
     if kind.startswith("TF"):
-        other = (*path[:-1], context["other"]) if "other" in context else None
+        conflicting = (
+            (*path[:-1], context["conflicts_with"]) if "conflicts_with" in context else None
+        )
         is_on_key = on_key or context.get("on_key", False)
         return SpecRefusal(
             kind,
@@ -296,7 +301,7 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> SpecRefusal:
             context["message"],
             help=context["help"],
             on_key=is_on_key,
-            other=other,
+            conflicts_with=conflicting,
             instead=context.get("instead"),
         )
     if kind == "missing":
@@ -332,9 +337,9 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> SpecRefusal:
 
 
 def _example(model: type[Spec], path: Path, value: Any) -> str:
-    """Return the help for what stands where a mapping with known keys belongs.
+    """Return an example of a mapping with known keys, to replace ``value``.
 
-    An example, with the value in it.
+    If possible, the example contains ``value``.
     """
     keys = fields_of(mapping_at(model, path))
     required = [name for name, field in keys.items() if field.is_required()]
@@ -350,7 +355,7 @@ def _example(model: type[Spec], path: Path, value: Any) -> str:
 
 
 def _allowed_values(model: type[Spec], path: Path) -> list[Any]:
-    """Return the words that may stand at a path, where these are listed."""
+    """Return the allowed words at a path, if the language lists them."""
     return [
         text
         for kind in kinds_of(value_at(model, path))
@@ -359,12 +364,12 @@ def _allowed_values(model: type[Spec], path: Path) -> list[Any]:
     ]
 
 
-#: Words that YAML 1.1 reads as true and false, and YAML 1.2 as strings.
+#: Words that are booleans in YAML 1.1 and strings in YAML 1.2.
 _SWITCHES = {"yes": "true", "on": "true", "no": "false", "off": "false"}
 
 
 def _as_string(value: Any) -> str:
-    """Return the help for what stands where a string belongs."""
+    """Return the help for a value that should be a string."""
     if isinstance(value, (int, float)):
         return "put it in quotes"
     inside = list(value.values()) if isinstance(value, dict) else value
@@ -381,9 +386,9 @@ def _as_string(value: Any) -> str:
 
 
 def _as_mapping(model: type[Spec], path: Path, value: Any) -> str:
-    """Return the help for what stands where a mapping with the user's own keys belongs.
+    """Return the help for a value that should be a mapping with the user's own keys.
 
-    Its items, or an example.
+    The help contains the value's items as a mapping, or an example.
     """
     around = mapping_at(model, path[:-1])
     field = fields_of(around).get(str(path[-1])) if around else None
@@ -405,12 +410,12 @@ def _as_mapping(model: type[Spec], path: Path, value: Any) -> str:
     return f"for example {path[-1]}: {{{inside}}}" if path else f"for example {inside}"
 
 
-#: A variable or a parameter, and a name in ROS's own notation, with its value.
+#: NAME=VALUE, or ROS's notation NAME:=VALUE.
 _ASSIGNED = re.compile(r"([^\s=:]+)(?::=|=)(.*)")
 
 
 def _pair(item: Any, usual: Any) -> tuple[str, Any] | None:
-    """Return key and value of a list item that should be a mapping like ``usual``."""
+    """Return key and value of a list item that should be in a mapping like ``usual``."""
     if isinstance(item, str) and (assigned := _ASSIGNED.fullmatch(item)):
         return assigned[1], assigned[2]
     if isinstance(item, str) and item.endswith((".yaml", ".yml")):
@@ -428,10 +433,7 @@ def _pair(item: Any, usual: Any) -> tuple[str, Any] | None:
 
 
 def _in_yaml(value: Any) -> str:
-    """Return a value as it is written in YAML, a plain word without quotes.
-
-    What is in a mapping is left out.
-    """
+    """Return a value as YAML, with plain words unquoted and mappings abbreviated to {…}."""
     if isinstance(value, dict):
         return "{…}"
     return (
@@ -441,7 +443,7 @@ def _in_yaml(value: Any) -> str:
     )
 
 
-#: pydantic's kinds of errors that the models can raise: code, message and help.
+#: pydantic's error types that the models can raise: code, message and help.
 WORDS = {
     "bool_type": ("TF103", "expected true or false, got {value}", ""),
     "dataclass_type": ("TF103", "expected a mapping, got {value}", ""),
@@ -453,5 +455,5 @@ WORDS = {
     "string_type": ("TF103", "expected a string, got {value}", ""),
     "tuple_type": ("TF103", "expected a list, got {value}", ""),
 }
-#: For a kind that a later pydantic may bring.
+#: For an error type of a later version of pydantic.
 UNFORESEEN = ("TF103", "{value} cannot stand here", "")

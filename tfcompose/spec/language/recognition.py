@@ -1,8 +1,9 @@
-"""Recognition of this language's files by their text, before anything in it is repeated to people.
+"""Recognition of this language's files by their text, before findings repeat any of it.
 
-A robot file names others: what it includes, its parts, what its tools read. Named by a stranger
-these can be a file of passwords, and findings about it would print it. So nothing of a text is
-repeated unless half of the keys at the begin of its lines are keys of this language.
+A robot file names other files: includes, parts, and files of tools. In a robot file from an
+untrusted source, such a name can be the path of a password file, and findings about that file
+would print its content. So findings repeat text of a file only if at least half of the keys at the
+start of its lines are keys of this language.
 """
 
 from __future__ import annotations
@@ -23,45 +24,45 @@ if TYPE_CHECKING:
 
     from tfcompose.spec.language.spec import Spec
 
-#: A key at the begin of a line, or the first one of a mapping in braces.
+#: A key at the start of a line, or the first key of a mapping in braces.
 _KEY = re.compile(r"""^(?:\{\s*)?["']?([A-Za-z_][\w-]*)["']?\s*:(?=[\s{\[]|$)""", re.MULTILINE)
-#: Versions of the core's language and of tools', which only their files say, wherever that is.
+#: A version key of the core's languages or of tools'. Only their files contain one.
 _SURE = re.compile(
     r"""^\s*\{?\s*["']?(?:"""
     + "|".join(("tfcompose", "preset", *shipped_tools().languages()))
     + r""")["']?\s*:\s*\d""",
     re.MULTILINE,
 )
-#: Text that says nothing: blank lines, comments, an empty mapping.
+#: Text without content: blank lines, comments, an empty mapping.
 _NOTHING = re.compile(r"(?:\s|#[^\n]*(?:\n|\Z)|---|\{\s*\})*")
 
 
 @cache
 def _keys() -> frozenset[str]:
-    """Return the keys at the top of robot files and presets."""
+    """Return the top-level keys of robot files and presets."""
     models = (RobotSpec, PresetSpec, NodePresetSpec)
     return frozenset().union(*(model.model_fields for model in models), shipped_tools().keys())
 
 
 def is_recognized(text: str, keys: Collection[str] = ()) -> bool:
-    """Return whether a text is that of a robot file, a preset or a tool's file, however broken.
+    """Return whether a text is a robot file, a preset or a tool's file, possibly broken.
 
-    ``keys`` are others.
+    ``keys`` are further valid keys.
     """
     if _SURE.search(text):
         return True
-    there = set(_KEY.findall(text))
-    known = there & frozenset(keys or _keys())
-    return bool(there) and 2 * len(known) >= len(there)
+    text_keys = set(_KEY.findall(text))
+    keys_of_robots = text_keys & frozenset(keys or _keys())
+    return bool(text_keys) and 2 * len(keys_of_robots) >= len(text_keys)
 
 
 def load_named(text: str, file: str, of: type[Spec] | None = None) -> Source:
-    """Return what a file says that another file names, as ``load`` does.
+    """Return the content of a file that another file names, as ``load`` does.
 
-    ``of`` is its model, if it is no robot.
+    ``of`` is the model of the file, if it is not a robot file.
 
     Raises:
-        RejectedError: as ``load`` does; of a file of something else it says nothing but that.
+        RejectedError: as in ``load``. For any other kind of file, the finding repeats no text.
     """
     keys = of.model_fields.keys() if of else ()
     if not is_recognized(text, keys) and not _NOTHING.fullmatch(text):
@@ -69,4 +70,4 @@ def load_named(text: str, file: str, of: type[Spec] | None = None) -> Source:
         raise RejectedError(
             [finding("TF002", "this is not a robot file", Span(file), help=advice)]
         )
-    return load(text, file)
+    return load(text, file, (of or RobotSpec).BEGIN)

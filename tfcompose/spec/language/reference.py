@@ -1,6 +1,6 @@
-"""The language as a reference for people, in Markdown.
+"""The language as a reference in Markdown.
 
-Every key with its type, unit, default, meaning and example.
+For every key it has type, unit, default, meaning and example.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ _EXPRESSIONS = (
     "`${…}` computes from `vars`, `args` and the environment; inside `[ ]` and `{ }` it needs"
     ' quotes: `[0, 0, "${mast}"]`.'
 )
-_REQUIRED = "Keys without a default are required."
+_REQUIRED = "Keys marked required must be set; the others may be left out."
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceKey:
-    """A key, with what is known of it in Markdown."""
+    """A key with its properties as Markdown."""
 
     name: str
     type: str
-    #: "required" if there has to be one; empty if there is none.
+    #: The default, "required" for a required key, or empty.
     default: str
     about: str
     examples: str
@@ -62,10 +62,10 @@ class ReferenceKey:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceSection:
-    """A mapping of a file, and its keys."""
+    """A mapping of a file, with its keys."""
 
     title: str
-    #: Where it occurs, and what it is: Markdown.
+    #: Its places and its meaning, as Markdown.
     text: str
     keys: tuple[ReferenceKey, ...]
 
@@ -75,7 +75,7 @@ class Reference:
     """All keys of a language."""
 
     title: str
-    #: What holds for all values: Markdown.
+    #: Rules for all values, as Markdown.
     rules: tuple[str, ...]
     sections: tuple[ReferenceSection, ...]
 
@@ -89,25 +89,25 @@ def reference_of(language: str) -> Reference:
     return Reference(
         f"{head}, version 1",
         rules=(_VALUES, *([_EXPRESSIONS] if language == "robot" else []), _REQUIRED),
-        sections=tuple(_section(kind, at) for kind, at in places.items()),
+        sections=tuple(_section(kind, place) for kind, place in places.items()),
     )
 
 
 def reference(language: str) -> str:
     """Return the keys of a language as Markdown, with a table for each section."""
-    known = reference_of(language)
-    lines = [f"# {known.title}", "", *known.rules, ""]
-    for section in known.sections:
+    reference = reference_of(language)
+    lines = [f"# {reference.title}", "", *reference.rules, ""]
+    for section in reference.sections:
         lines += _table(section)
     return "\n".join(lines).rstrip() + "\n"
 
 
 def key_page(path: str) -> str | None:
-    """Return what a robot file's key means, as Markdown; None where there is no such key.
+    """Return the meaning of a robot file's key as Markdown, None for an unknown key.
 
-    ``path`` names it with its sections, with names or without: ``sensors.place`` or
-    ``sensors.laser.place``; or the kind of a section: ``sensor``; or it is a key alone, of which
-    every place is explained.
+    ``path`` can be the key with its sections, with or without names of entries, such as
+    ``sensors.place`` or ``sensors.laser.place``. It can be a kind of section, such as ``sensor``.
+    It can be only the key, in which case the page explains all its places.
     """
     steps = tuple(path.split("."))
     places = [(pattern, kind) for pattern, kind in walk(model_of("robot")) if pattern]
@@ -139,33 +139,38 @@ def key_page(path: str) -> str | None:
     ]
     if sections:
         kind = sections[0][1]
-        lines += _table(_section(kind, [_place(path) for path, other in places if other is kind]))
+        lines += _table(
+            _section(kind, [_place(path) for path, place_kind in places if place_kind is kind])
+        )
     return "\n".join(lines).rstrip() + "\n" if lines else None
 
 
 def sections_with_key(path: str) -> list[str]:
-    """Return the titles of a robot file's sections that have the key; ``path`` as above."""
+    """Return titles of a robot file's sections that have the key; ``path`` as in ``key_page``."""
     return list(dict.fromkeys(_title(kind) for _, kind in _with_key(tuple(path.split(".")))))
 
 
 def _with_key(steps: tuple[str, ...]) -> list[tuple[Pattern, Any]]:
-    """Return the sections that have the key, with their places; the file alone has its own."""
+    """Return the sections that have the key, with their places.
+
+    A key at the top level takes precedence over the same key in sections.
+    """
     root = model_of("robot")
     if len(steps) == 1 and steps[0] in fields_of(root):
         return [((), root)]
     return [
-        (at, kind)
-        for at, kind in walk(root)
-        if steps[-1] in fields_of(kind) and (len(steps) == 1 or _is_at(at, steps[:-1]))
+        (place, kind)
+        for place, kind in walk(root)
+        if steps[-1] in fields_of(kind) and (len(steps) == 1 or _is_at(place, steps[:-1]))
     ]
 
 
 def paths() -> list[str]:
-    """Return where each key of a robot file is, such as ``sensors.place``, without names."""
-    found = walk(model_of("robot"))
+    """Return the path of each key of a robot file without names of entries, as sensors.place."""
+    paths = walk(model_of("robot"))
     return [
         ".".join(step for step in (*path, name) if step != "*")
-        for path, kind in found
+        for path, kind in paths
         for name in fields_of(kind)
     ]
 
@@ -180,7 +185,7 @@ def keys() -> list[str]:
 
 
 def _is_at(pattern: Pattern, steps: tuple[str, ...]) -> bool:
-    """Return whether words name the place, in which a name may be left out."""
+    """Return whether the steps match the place. Names of entries may be left out."""
     if not pattern or not steps:
         return not steps and all(step == "*" for step in pattern)
     if pattern[0] == "*":
@@ -231,7 +236,7 @@ _MOST_PLACES = 6
 
 
 def _places(places: list[str]) -> list[str]:
-    """Return where a mapping stands; the whole file needs no word."""
+    """Return a sentence with the places of a mapping, nothing for the top level."""
     named = [f"`{place}`" for place in places if place]
     return [f"At {_list_places(named)}.", ""] if named else []
 
@@ -242,7 +247,7 @@ def _row(key: ReferenceKey) -> str:
 
 
 def _examples(field: FieldInfo) -> str:
-    """Return examples where the type itself does not list what there is."""
+    """Return examples, unless the type itself lists the values."""
     if field.examples:
         return " or ".join(f"`{flow(example)}`" for example in examples_of(field))
     measure = measure_of(field.rebuild_annotation())
@@ -259,7 +264,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _type(annotation: Any) -> str:
-    """Return a type in words: what it is called, of what it is a list, or its choices."""
+    """Return a type as text: its name, the type of a list's items, or its choices."""
     annotation = unwrap_named_type(annotation)
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
@@ -290,19 +295,19 @@ def _annotate(inner: Any, metadata: tuple[Any, ...]) -> str:
             return "number" if not annotation.unit else "quantity"
         if isinstance(annotation, InARow):
             return f"list of {annotation.count} {_plural(_type(get_args(inner)[0]))}"
-        other = unwrap_named_type(getattr(annotation, "json_schema_input_type", None))
-        if get_origin(other) in {Union, types.UnionType, Literal}:
-            return _type(other)
+        input_type = unwrap_named_type(getattr(annotation, "json_schema_input_type", None))
+        if get_origin(input_type) in {Union, types.UnionType, Literal}:
+            return _type(input_type)
     return _type(inner)
 
 
 def _plural(noun: str) -> str:
-    known = {
+    plurals = {
         "string": "strings",
         "number": "numbers",
         "quantity": "quantities",
         "whole number": "whole numbers",
     }
-    return known.get(
+    return plurals.get(
         noun, f"lists{noun.removeprefix('list')}" if noun.startswith("list of ") else noun
     )

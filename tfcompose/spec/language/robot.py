@@ -1,7 +1,6 @@
-"""The language of ``robot.yaml``, version 1: what a user writes, typed.
+"""The language of ``robot.yaml``, version 1, as typed models.
 
-The descriptions and examples here are what an editor shows and what ``tfcompose schema
---reference`` prints.
+Editors and ``tfcompose schema --reference`` show the descriptions and examples from these models.
 """
 
 from collections.abc import Iterator
@@ -81,7 +80,7 @@ class FrameSpec(MountKeys):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield what is wrong with the data together, with paths below them."""
+        """Yield faults of the combination of keys, with paths below the frame."""
         yield from super().check(data)
         if "owner" in data and "parent" not in data:
             advice = (
@@ -100,7 +99,7 @@ class FrameSpec(MountKeys):
 
 
 class Mimic(Spec):
-    """The joint follows another one.
+    """A joint that follows another one.
 
     Its position is multiplier · position of the other joint + offset.
     """
@@ -118,7 +117,7 @@ def _only_one(value: Any) -> Any:
     return [value]
 
 
-#: Whether joints of a type slide; bare numbers are metres then, else radians.
+#: Whether joints of a type slide. For these, numbers without a unit are metres, otherwise radians.
 _SLIDES = {"revolute": False, "continuous": False, "prismatic": True}
 
 
@@ -138,6 +137,12 @@ class JointSpec(EdgeKeys):
         "the axis in the child's frame, default x as in URDF; for a planar joint the normal of "
         "the plane",
         [0, 0, 1],
+    )
+    offset: JointPosition = key(
+        0.0,
+        "correction of the joint's zero: at the reported position q the child is where q + offset "
+        "would place it",
+        "0.4 deg",
     )
     limit: Limit | None = key(
         None,
@@ -161,17 +166,22 @@ class JointSpec(EdgeKeys):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also lengths of joints that turn, and angles of joints that slide."""
+        """Also yield lengths for joints that rotate and angles for joints that slide."""
         yield from super().check(data)
         kind = data.get("type")
-        for section, field in (
-            cls.model_fields.items() if isinstance(kind, str) and kind in _SLIDES else ()
-        ):
-            inside = data.get(section)
-            for name, value in inside.items() if isinstance(inside, dict) else ():
-                measure = measure_of(below(field.annotation, name))
-                if measure and measure.sliding and isinstance(value, (str, Quantity)):
-                    yield from _wrong_unit(str(kind), (section, name), value, measure)
+        if not isinstance(kind, str) or kind not in _SLIDES:
+            return
+        for name, field in cls.model_fields.items():
+            annotation, value = field.rebuild_annotation(), data.get(name)
+            values: dict[Path, tuple[Any, Any]] = {(name,): (annotation, value)}
+            if isinstance(value, dict):
+                values = {
+                    (name, step): (below(annotation, step), inner) for step, inner in value.items()
+                }
+            for path, (kind_of_value, number) in values.items():
+                measure = measure_of(kind_of_value)
+                if measure and measure.sliding and isinstance(number, (str, Quantity)):
+                    yield from _wrong_unit(kind, path, number, measure)
 
 
 def _wrong_unit(
@@ -180,18 +190,18 @@ def _wrong_unit(
     try:
         dimension = (quantity(value) if isinstance(value, str) else value).dimension
     except UnitError:
-        return  # it is refused for that
+        return  # another check rejects it
     turning, sliding = measure.dimensions
-    wanted, other = (sliding, turning) if _SLIDES[kind] else (turning, sliding)
-    if dimension == other:
+    dimensions, opposite = (sliding, turning) if _SLIDES[kind] else (turning, sliding)
+    if dimension == opposite:
         moves = "slides" if _SLIDES[kind] else "turns"
-        what = value if isinstance(value, str) else with_article(other)
+        what = value if isinstance(value, str) else with_article(opposite)
         message = f"a {kind} joint {moves}: {path[-1]} cannot be {what}"
-        yield path, invalid("TF104", message, f"for example {example(wanted)}", keeps=True)
+        yield path, invalid("TF104", message, f"for example {example(dimensions)}", keeps=True)
 
 
 def _scalar(value: Any) -> str:
-    """Return the string that stands in XML: a parameter has no type there."""
+    """Return the text of a parameter in XML, where parameters have no types."""
     if isinstance(value, Quantity):
         if value.dimension != NUMBER:
             raise invalid("TF104", f"{format_value(value)} has a unit, and a parameter has none")
@@ -208,12 +218,12 @@ def _scalar(value: Any) -> str:
     )
 
 
-#: A parameter in XML, as the string that stands there.
+#: A parameter in XML, as its text.
 XmlParameters = dict[str, Annotated[str, BeforeValidator(_scalar, str | float | bool)]]
 
 
 def _by_name(value: Any) -> Any:
-    """Return interfaces by name, of names alone or with parameters."""
+    """Return interfaces by name, from a list of names or a mapping."""
     if not isinstance(value, list):
         return value
     wrong = [index for index, name in enumerate(value) if not isinstance(name, str)]
@@ -250,7 +260,7 @@ class HardwareSpec(Entry):
     is_async: Boolean | None = key(None, "true: it is read and written in its own thread")
     joints: dict[str, ComponentSpec] = key(
         {},
-        "its joints by the names in the robot",
+        "its joints, by their names in the robot file",
         {"wheel_left_joint": {"command": ["velocity"], "state": ["position"]}},
     )
     sensors: dict[str, ComponentSpec] = key(
@@ -262,7 +272,7 @@ class HardwareSpec(Entry):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also what ros2_control refuses of a component of that type."""
+        """Also yield keys that ros2_control rejects for a component of this type."""
         yield from super().check(data)
         joints = data.get("joints", {})
         if data.get("type") == "actuator" and isinstance(joints, dict) and len(joints) != 1:
@@ -359,20 +369,20 @@ class Origin(Posed):
     """A pose for a block parameter of a macro."""
 
 
-#: A macro's parameter: a mapping is a pose; everything else is passed on as it is.
+#: A macro's parameter. A mapping is a pose; any other value is passed on unchanged.
 MacroParameter = Annotated[
     Annotated[Origin, Tag("[origin]")] | Annotated[NoMapping, Tag("[value]")],
     Discriminator(lambda value: "[origin]" if isinstance(value, dict) else "[value]"),
 ]
 
-#: What can be the part, and which keys go with it alone.
+#: Kinds of parts, and keys that are valid only for that kind.
 PART_KINDS = {
     "spec": ("vars", "profiles", "args"),
     "urdf": (),
     "xacro": ("args", "macro", "params", "include"),
 }
 _MACRO_KEYS = ("params", "include")
-#: What a file is by its ending. xacro reads plain URDF too, so that xacro: FILE.urdf is right.
+#: Kind of a file by its ending. xacro also reads plain URDF, so ``xacro: FILE.urdf`` is valid.
 _ENDINGS = {".urdf": "urdf", ".xacro": "xacro", ".yaml": "spec", ".yml": "spec"}
 
 
@@ -416,7 +426,7 @@ class PartSpec(MountKeys):
     )
     namespace: Namespace | None = key(
         None,
-        "makes the part a separate robot with its own static and joints; relative to "
+        "makes the part a separate robot, with its own processes static and joints; relative to "
         "ros.namespace",
         "robot1",
     )
@@ -424,8 +434,7 @@ class PartSpec(MountKeys):
     vars: Parameters = key({}, "values for variables of the robot file", {"mast": "40 cm"})
     root: Text | None = key(
         None,
-        "the frame of the part, without the prefix, at which it begins; default: the complete "
-        "part",
+        "the frame, without the prefix, whose subtree is the part; default: the complete part",
         "base_link",
     )
     place: Text | None = key(
@@ -439,12 +448,12 @@ class PartSpec(MountKeys):
 
     @property
     def is_alone(self) -> bool:
-        """Whether it is a robot of its own beside the others, with joint states of its own."""
+        """Whether the part is a separate robot with its own joint states."""
         return bool((self.namespace or "").strip("/"))
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also a part that is nothing, or has keys of another kind of part."""
+        """Also yield a part without a kind, and keys of another kind of part."""
         yield from super().check(data)
         kind = next((kind for kind in PART_KINDS if kind in data), None)
         if kind is None:
@@ -458,9 +467,9 @@ class PartSpec(MountKeys):
         for name in dict.fromkeys(
             name for names in PART_KINDS.values() for name in names if name in data
         ):
-            others = [other for other, names in PART_KINDS.items() if name in names]
-            if kind not in others:
-                message = f"{name} goes with {' and '.join(others)}, not with {kind}"
+            kinds = [part_kind for part_kind, names in PART_KINDS.items() if name in names]
+            if kind not in kinds:
+                message = f"{name} goes with {' and '.join(kinds)}, not with {kind}"
                 yield (name,), invalid("TF107", message, on_key=True, keeps=True)
         for name in _MACRO_KEYS:
             if name in data and "macro" not in data:
@@ -501,12 +510,12 @@ class RosSpec(RosSettings):
     ) = inherit_field(RosSettings, "router")
     isolate: Isolation = documented_field(
         "none",
-        "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless "
+        "topics: /tf moves into the namespace; frames: the namespace is the prefix, unless "
         "frame_prefix is set",
     )
     state_publisher: StatePublisher = documented_field(
         "tfcompose",
-        "stock: robot_state_publisher publishes the edges below base that tfcompose owns",
+        "stock: robot_state_publisher publishes tfcompose's edges below base",
     )
 
 
@@ -514,7 +523,7 @@ class RobotOverlays(Entry):
     """Overlays of single robots, so that one robot file serves several of them."""
 
     by: Literal["hostname"] = key(
-        "hostname", "the name of a robot: the hostname of its computer", "hostname"
+        "hostname", "the source of a robot's name: the hostname of its computer", "hostname"
     )
     folder: Text = key(
         "overlays", "folder of the overlays, HOSTNAME.yaml, relative to this file", "overlays"
@@ -531,7 +540,7 @@ class RobotSpec(Spec):
         Text, Matches(r"[a-z][a-z0-9_]*", "a robot's name: lower case letters, digits and _")
     ] = key(..., "the robot's name", "rover")
     include: OneOrMore = key(
-        (), "files that this file is merged over, relative to this file", ["base.yaml"]
+        (), "files that this file extends and overrides, relative to this file", ["base.yaml"]
     )
     calibrations: CalibrationFiles = key(
         (), "calibration files; every entry is applied", ["calibration/kit.yaml"]
@@ -540,6 +549,11 @@ class RobotSpec(Spec):
         None,
         "the root link of the URDF; default: base_link, or the only root",
         "base_footprint",
+    )
+    ground: Text | None = key(
+        None,
+        "the frame on the floor below the base; default: base_footprint, if there is one",
+        "floor",
     )
     vars: Parameters = key(
         {}, "quantities, numbers or strings; use them as ${name}", {"mast": "30 cm"}
@@ -614,7 +628,7 @@ class RobotSpec(Spec):
     )
     overlays: RobotOverlays | None = key(
         None,
-        "overlays of single robots, chosen with --robot, by up from the hostname",
+        "overlays of single robots, chosen with --robot; up chooses by the hostname",
         {"by": "hostname", "folder": "overlays"},
     )
     guard: GuardPolicy = key(GuardPolicy(), "the checks of the live tree", {"mode": "strict"})
@@ -644,17 +658,17 @@ class RobotSpec(Spec):
 
     @property
     def spans(self) -> Spans:
-        """Where the keys and values of the file are."""
+        """Spans of the keys and values of the file."""
         return self._spans
 
     def carry(self, spans: Spans) -> None:
-        """Take the spans of what the spec was validated from."""
+        """Store the spans of the source from which the spec was validated."""
         self._spans = spans
 
     def span_of(self, path: Path) -> Span:
-        """Return the value's place, or that of the nearest mapping or list around it."""
+        """Return the span of the value at a path, or of the nearest enclosing mapping or list."""
         return self._spans.span_of(path)
 
     def key_span(self, path: Path) -> Span:
-        """Return the place of the key, or of the nearest key around it."""
+        """Return the span of the key at a path, or of the nearest enclosing key."""
         return self._spans.key_span(path)

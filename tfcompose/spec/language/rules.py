@@ -20,7 +20,7 @@ Level = Literal["off", "warning", "error"]
 
 
 def _percent(value: Any) -> Any:
-    """Return the part for what is written in percent: 0.3 for ``30 %``."""
+    """Return the fraction for a percentage: 0.3 for ``30 %``."""
     if isinstance(value, str) and value.rstrip().endswith("%"):
         number = value.rstrip().removesuffix("%")
         try:
@@ -81,7 +81,7 @@ RuleSetting = Annotated[
 
 
 def level_of(setting: RuleSpec | str) -> str:
-    """Return the severity that is set; empty for that of the code."""
+    """Return the severity that is set, empty for the code's own severity."""
     return setting if isinstance(setting, str) else setting.severity or ""
 
 
@@ -97,5 +97,5 @@ class ZoneSpec(Spec):
         ["lidar", "camera"],
     )
     least: Annotated[Number, BeforeValidator(_part, str | float)] = key(
-        1.0, "the part of the box that must be seen", "90 %"
+        1.0, "the share of the box that must be seen", "90 %"
     )

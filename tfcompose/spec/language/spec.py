@@ -1,4 +1,4 @@
-"""Base of all models of the language, and a walk over the models' fields."""
+"""Base of all models of the language, and functions that walk over the models' fields."""
 
 from __future__ import annotations
 
@@ -42,36 +42,42 @@ Items of a list stand where the list does.
 
 
 class Spec(BaseModel):
-    """A mapping with known keys; others are refused. Objects do not change."""
+    """A mapping with known keys. Other keys are rejected. Objects are immutable."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, defer_build=True, protected_namespaces=()
     )
 
+    #: The help for a file of this model that holds no mapping.
+    BEGIN: ClassVar[str] = "a robot begins with: tfcompose: 1"
 
-#: Given to the first validation of data: later ones read what that left, which no longer shows
-#: what was meant.
+
+#: Context of the first validation of the data. Later validations get the remaining data, which no
+#: longer show the user's intention.
 FIRST = "the data are as they were written"
 
 
 class Checked(Spec):
     """A mapping with checks across its keys."""
 
-    #: Sets of keys of which at most one may be given; an overlay that sets one drops the others.
+    #: Groups of keys of which at most one may be set. If an overlay sets one, the others are
+    #: dropped.
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = ()
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield what is wrong with the data together, with paths below them."""
+        """Yield faults of the combination of keys, with paths below the mapping."""
         for keys in cls.EXCLUSIVE:
             if len(keys & data.keys()) > 1:
-                first, *others = present = [name for name in data if name in keys]
-                for name in others:
+                first, *surplus = present = [name for name in data if name in keys]
+                for name in surplus:
                     advice = f"keep one of {', '.join(present)}"
                     message = f"{name} and {first} exclude each other"
                     yield (
                         (name,),
-                        invalid("TF107", message, advice, on_key=True, other=first, keeps=True),
+                        invalid(
+                            "TF107", message, advice, on_key=True, conflicts_with=first, keeps=True
+                        ),
                     )
 
     @model_validator(mode="wrap")
@@ -92,9 +98,9 @@ class Checked(Spec):
 
 
 class Entry(Checked):
-    """An entry of a section, which may be there or not, or several times.
+    """An entry of a section, which may be conditional or repeated.
 
-    ``conditions`` decides it before this.
+    ``conditions`` evaluates ``when`` and ``for`` before this model is validated.
     """
 
     when: Condition | None = Field(
@@ -115,7 +121,7 @@ class Entry(Checked):
 def several(
     *errors: tuple[Path, PydanticCustomError], also: ValidationError | None = None
 ) -> ValidationError:
-    """Return a validator's error for paths below its value, and another validation's."""
+    """Return a validation error for paths below a value, combined with another one."""
     lines: list[InitErrorDetails] = [
         {"type": error, "loc": path, "input": None} for path, error in errors
     ]
@@ -129,9 +135,9 @@ def several(
 
 
 def key(default: Any = ..., about: str = "", *examples: Any, **more: Any) -> Any:
-    """Describe a key of a ``Spec``; without a default it is required.
+    """Describe a key of a ``Spec``. Without a default, the key is required.
 
-    ``more`` is for ``more_of``.
+    ``more`` holds further properties, which ``more_of`` returns.
     """
     return Field(
         default,
@@ -142,15 +148,15 @@ def key(default: Any = ..., about: str = "", *examples: Any, **more: Any) -> Any
 
 
 def more_of(field: FieldInfo, name: str, default: Any) -> Any:
-    """Return what else is known of a key under a name, or the default."""
+    """Return a further property of a key by its name, or the default."""
     more = field.json_schema_extra
     return more.get(name, default) if isinstance(more, dict) else default
 
 
 def inherit_field(of: type, name: str) -> Any:
-    """Return a dataclass's field for a subclass that narrows its type.
+    """Return a dataclass's field, for a subclass that narrows the field's type.
 
-    Default and description stay.
+    Default and description stay the same.
     """
     base = next(field for field in dataclasses.fields(of) if field.name == name)
     return dataclasses.field(
@@ -159,15 +165,15 @@ def inherit_field(of: type, name: str) -> Any:
 
 
 def unwrap_named_type(annotation: Any) -> Any:
-    """Return what a named type stands for.
+    """Return the type that a named type stands for.
 
-    Pydantic makes its schema once, whichever models share it.
+    pydantic makes the schema of a named type only once for all models.
     """
     return annotation.__value__ if isinstance(annotation, TypeAliasType) else annotation
 
 
 def kinds_of(annotation: Any) -> Iterator[Any]:
-    """Yield the types that an annotation allows, without ``None``, ``Annotated`` and unions."""
+    """Yield the types that an annotation allows, without None, ``Annotated`` and unions."""
     annotation = unwrap_named_type(annotation)
     origin = get_origin(annotation)
     if origin is Annotated:
@@ -182,14 +188,14 @@ def kinds_of(annotation: Any) -> Iterator[Any]:
 def is_mapping(kind: Any) -> bool:
     """Return whether the type is a mapping with known keys.
 
-    A ``Spec``, or a dataclass that serves as one.
+    This is a ``Spec``, or a dataclass used like one.
     """
     return isinstance(kind, type) and (issubclass(kind, Spec) or dataclasses.is_dataclass(kind))
 
 
 @cache
 def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
-    """Return the keys of a mapping with known keys: its own, then those that it inherits."""
+    """Return the keys of a mapping with known keys: its own, then inherited keys."""
     if issubclass(kind, Spec):
         spec: type[Spec] = kind
         fields = spec.model_fields
@@ -204,23 +210,23 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
 
 
 def below(annotation: Any, step: str | int) -> Any:
-    """Return the annotation below one, at a key or an index, or None."""
+    """Return the annotation at a key or an index below an annotation, or None."""
     for kind in kinds_of(annotation):
         if is_mapping(kind):
             if step in fields_of(kind):
                 return fields_of(kind)[str(step)].rebuild_annotation()
         elif get_origin(kind) is dict:
             return get_args(kind)[1]
-        elif get_origin(kind) is tuple:  # one item may stand for a list of it
+        elif get_origin(kind) is tuple:  # a single item may replace a list
             item = get_args(kind)[0]
-            found = item if isinstance(step, int) else below(item, step)
-            if found is not None:
-                return found
+            value = item if isinstance(step, int) else below(item, step)
+            if value is not None:
+                return value
     return None
 
 
 def measure_of(annotation: Any) -> Measure | None:
-    """Return the measure of the number or numbers that an annotation allows, or None."""
+    """Return the measure of the numbers that an annotation allows, or None."""
     annotation = unwrap_named_type(annotation)
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
@@ -228,19 +234,21 @@ def measure_of(annotation: Any) -> Measure | None:
             (annotation for annotation in more if isinstance(annotation, Measure)), None
         ) or measure_of(inner)
     if get_origin(annotation) in {Union, types.UnionType, tuple}:
-        return next((found for base in get_args(annotation) if (found := measure_of(base))), None)
+        return next(
+            (measure for base in get_args(annotation) if (measure := measure_of(base))), None
+        )
     return None
 
 
 def value_at(model: Any, path: tuple[str | int, ...]) -> Any:
-    """Return the annotation of what is at a path in a file of the model, or None."""
+    """Return the annotation of the value at a path in a file of the model, or None."""
     for step in path:
         model = below(model, step)
     return model
 
 
 def mappings_at(model: Any, path: tuple[str | int, ...]) -> list[Any]:
-    """Return the mappings with known keys that may stand at a path, or in a list there."""
+    """Return the mappings with known keys that are possible at a path, or in a list there."""
     kinds = list(kinds_of(value_at(model, path)))
     kinds += [
         item for kind in kinds if get_origin(kind) is tuple for item in kinds_of(get_args(kind)[0])
@@ -249,12 +257,15 @@ def mappings_at(model: Any, path: tuple[str | int, ...]) -> list[Any]:
 
 
 def mapping_at(model: Any, path: tuple[str | int, ...]) -> Any:
-    """Return the mapping with known keys, or the one in a list, that stands at a path, or None."""
+    """Return the first mapping with known keys that is possible at a path, or None."""
     return next(iter(mappings_at(model, path)), None)
 
 
 def walk(annotation: Any, pattern: Pattern = ()) -> Iterator[tuple[Pattern, Any]]:
-    """Yield every mapping with known keys below an annotation, and where it is; itself first."""
+    """Yield every mapping with known keys below an annotation, with its place.
+
+    If the annotation is such a mapping, it comes first.
+    """
     for kind in kinds_of(annotation):
         if is_mapping(kind):
             yield pattern, kind
@@ -267,14 +278,14 @@ def walk(annotation: Any, pattern: Pattern = ()) -> Iterator[tuple[Pattern, Any]
 
 
 def describe_key(field: FieldInfo) -> str:
-    """Return what a key means, with its unit."""
+    """Return the description of a key, with its unit."""
     measure = measure_of(field.rebuild_annotation())
     unit = f" ({measure.about})" if measure and measure.unit else ""
     return f"{field.description}{unit}"
 
 
 def examples_of(field: FieldInfo) -> list[Any]:
-    """Return examples of a key: those given, else those that its type has."""
+    """Return the examples of a key, otherwise those of its type."""
     if field.examples:
         return list(field.examples)
     annotation = field.rebuild_annotation()

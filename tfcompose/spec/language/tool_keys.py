@@ -1,7 +1,7 @@
-"""Sections of the robot file that tools bring: the model of a robot file with them.
+"""Sections of the robot file that tools add, and the model of a robot file with these sections.
 
-Tools of other packages are looked up only where a file has a key that neither the core nor a tool
-that ships knows.
+Tools in other packages are looked up only if the file has a key that neither the core nor a
+built-in tool knows.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ if TYPE_CHECKING:
 
 
 def robot_model(names: Collection[str]) -> type[RobotSpec]:
-    """Return the model of a robot file with the sections of the tools it uses."""
+    """Return the model of a robot file, with the sections of the tools that it uses."""
     return _model(_tools_for(names))
 
 
 def keys_in(names: Collection[str]) -> list[Key]:
-    """Return the sections of tools among those of a robot file."""
+    """Return the sections of tools among the sections of a robot file."""
     return [section for name, section in _tools_for(names).keys().items() if name in names]
 
 
 def data_for_plan(section: Key, value: Any) -> Any:
-    """Return a section as the plan holds it, as JSON; None where the plan has none of it."""
+    """Return a section as JSON data for the plan, None if the plan does not contain it."""
     if section.in_plan:
         return to_jsonable_python(value)
     return None
 
 
 def problems_with(names: Collection[str]) -> list[Finding]:
-    """Return what is wrong with the foreign tools that these sections need."""
+    """Return findings about tools in other packages that these sections need."""
     tools = _tools_for(names)
     _, broken = _types(tools)
     return [
@@ -58,9 +58,9 @@ _NO_TOOLS = Toolset(())
 
 
 def _tools_for(names: Collection[str]) -> Toolset:
-    """Return the tools among which those are that know these sections.
+    """Return a set of tools that includes those of these sections.
 
-    No more than needed are looked up.
+    Installed packages are searched only if necessary.
     """
     unknown = set(names) - RobotSpec.model_fields.keys()
     if not unknown:
@@ -80,16 +80,16 @@ def _model(tools: Toolset) -> type[RobotSpec]:
     model: type[RobotSpec] = create_model(
         "RobotSpec", __base__=RobotSpec, __doc__=RobotSpec.__doc__, __module__=__name__, **fields
     )  # type: ignore[call-overload]
-    # The keys of the core first: the reference and the schema follow the order of annotations.
+    # Keys of the core come first, because reference and schema follow the order of annotations.
     model.__annotations__ = inspect.get_annotations(RobotSpec) | model.__annotations__
     return model
 
 
 @cache
 def _types(tools: Toolset) -> tuple[dict[str, Any], list[Problem]]:
-    """Return the type of each section, and a problem for each whose model cannot be loaded.
+    """Return the type of each section, and a problem for each model that cannot be loaded.
 
-    What such a section says is not checked.
+    Such a section is not validated.
     """
     types: dict[str, Any] = {}
     problems = []

@@ -1,4 +1,4 @@
-"""Validation of a source into a typed spec, which finds all errors in one pass."""
+"""Validation of a source into a typed spec, with all errors at once."""
 
 from __future__ import annotations
 
@@ -33,45 +33,46 @@ M = TypeVar("M", bound=Spec)
 
 @dataclass(frozen=True, slots=True)
 class Validated:
-    """A spec without refused entries, and the findings about these."""
+    """A spec without rejected values, and the findings about these values."""
 
     spec: RobotSpec
-    #: The source after conditions and loops were applied.
+    #: The source with conditions and loops applied.
     source: Source
     findings: tuple[Finding, ...]
-    #: The paths of refused values.
+    #: Paths of rejected values.
     refused: frozenset[Path] = frozenset()
-    #: The paths of variables and arguments that nothing uses.
+    #: Variables and arguments that are not used, as (section, name).
     unused: tuple[tuple[str, str], ...] = ()
     inputs: BuildInputs = _NOTHING
-    #: The values of the arguments: those of ``inputs``, or their defaults.
+    #: Values of the arguments, from ``inputs`` or the defaults.
     args: dict[str, ParameterValue] = field(default_factory=dict)
-    #: The values of the environment variables that the file names.
+    #: Values of the environment variables that the file uses.
     environment: dict[str, str] = field(default_factory=dict)
-    #: Conditions of the entries that they left out, by (section, name).
+    #: Conditions that removed entries, by (section, name) of the entry.
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
-    #: Entries with refused values, by (section, name). Errors that follow from them are not
+    #: Entries with rejected values, as (section, name). Errors that follow from them are not
     #: reported.
     broken: frozenset[tuple[str, str]] = frozenset()
-    #: The plain data of the source with arguments and environment: the input of a plan's digest.
+    #: The plain data of the source with arguments and environment, from which a plan's digest is
+    #: computed.
     source_data: dict[str, Any] = field(default_factory=dict)
 
 
-#: Sections whose entries define names of frames.
+#: Sections whose entries define frames.
 _BRINGS_FRAMES = frozenset({"frames", "joints", "links", "parts", "sensors"})
 
 
 def _entry(path: Path) -> tuple[str, str]:
-    """Return the (section, name) of a refused path; the name is empty for a whole section.
+    """Return the (section, name) of a rejected path; the name is empty for a complete section.
 
-    If the section may have defined any frame, return that of a part without a prefix.
+    A section that may have defined any frame counts as a part without a prefix.
     """
     section, name = (*map(str, path[:2]), "")[:2]
     return ("parts" if not name and section in _BRINGS_FRAMES else section), name
 
 
 def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield the entries of links that lack a parent because their joint was refused."""
+    """Yield links that lack a parent because their joint was rejected."""
     for section, name in broken:
         joint = joints.get(name) if section == "joints" else None
         child = joint.get("child") if isinstance(joint, dict) else None
@@ -79,27 +80,28 @@ def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[
             yield ("links", child)
 
 
-def validate(source: Source, aside: Any = None, inputs: BuildInputs = _NOTHING) -> Validated:
+def validate(source: Source, profiles: Any = None, inputs: BuildInputs = _NOTHING) -> Validated:
     """Return the typed spec of a file, built with the ``inputs``.
 
-    ``aside`` is data that is not merged now, such as other profiles, but may use its variables.
+    ``profiles`` are data that are not merged now, such as other profiles. They may use the
+    variables.
 
     Raises:
         RejectedError: if the robot's name or the version is missing.
     """
     variables = Variables(source, inputs)
-    idle = unused_variables(source.data, aside)
+    idle = unused_variables(source.data, profiles)
     done = unfold(source, variables)
     source = done.source
     nulls = _nulls(source)
     data = variables.compute(source.data, done.scopes)
     already = [*(null.path for null in nulls), *variables.uncomputed]
     spec, refusals = read(robot_model(source.data), data, already)
-    own = _findings([*nulls, *variables.refusals, *refusals], source)
+    source_findings = _findings([*nulls, *variables.refusals, *refusals], source)
     findings = (
         *source.findings,
         *without_duplicates([*variables.findings, *done.findings]),
-        *own,
+        *source_findings,
         *problems_with(source.data),
     )
     if spec is None:
@@ -129,27 +131,27 @@ def validate(source: Source, aside: Any = None, inputs: BuildInputs = _NOTHING) 
 
 
 def _with_ros_arguments(spec: RobotSpec, arguments: RosArguments) -> RobotSpec:
-    """Return the robot with the namespace and the clock of the ROS arguments.
+    """Return the robot with namespace and clock from the ROS arguments.
 
-    Frames keep the names of the robot file, even those with the file's own namespace.
+    Frame names do not change, not even those with the namespace of the file.
     """
     if arguments == RosArguments():
         return spec
-    ros, own = spec.ros, spec.ros.namespace.strip("/")
+    ros, ros_namespace = spec.ros, spec.ros.namespace.strip("/")
     if arguments.namespace:
         isolate, prefix = ros.isolate, ros.frame_prefix
-        if own and not prefix and isolate in {"frames", "both"}:
-            prefix = f"{own}/"
+        if ros_namespace and not prefix and isolate in {"frames", "both"}:
+            prefix = f"{ros_namespace}/"
         if not prefix:
             isolate = _WITHOUT_FRAMES.get(isolate, isolate)
-        namespace = "/".join(filter(None, (arguments.namespace, own)))
+        namespace = "/".join(filter(None, (arguments.namespace, ros_namespace)))
         ros = replace(ros, namespace=namespace, frame_prefix=prefix, isolate=isolate)
     if arguments.use_sim_time is not None:
         ros = replace(ros, clock="sim" if arguments.use_sim_time else "wall")
     return spec.model_copy(update={"ros": ros})
 
 
-#: Isolation of topics for each isolation, without frames.
+#: The isolation that remains without isolation of frames.
 _WITHOUT_FRAMES: dict[Isolation, Isolation] = {"frames": "none", "both": "topics"}
 
 
@@ -157,7 +159,7 @@ def validate_preset(source: Source) -> PresetSpec:
     """Return the typed preset.
 
     Raises:
-        RejectedError: with every finding, if anything is wrong with it.
+        RejectedError: with all findings, if the preset is invalid.
     """
     return validate_file(PresetSpec, source, wrong_names)
 
@@ -165,12 +167,12 @@ def validate_preset(source: Source) -> PresetSpec:
 def validate_file(
     kind: type[M], source: Source, check: Callable[[M], Iterable[SpecRefusal]] = lambda _: ()
 ) -> M:
-    """Return the typed file of a language that needs only its model.
+    """Return the typed content of a file in a language that needs only its model.
 
     ``check`` yields further faults of a file whose keys and values are valid.
 
     Raises:
-        RejectedError: with every finding, if anything is wrong with it.
+        RejectedError: with all findings, if the file is invalid.
     """
     nulls = _nulls(source)
     spec, refused = read(kind, source.data, [null.path for null in nulls])
@@ -184,10 +186,10 @@ def validate_file(
 
 
 def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[str, str]]:
-    """Yield each entry of ``rules`` with its severity, empty for that of the code.
+    """Yield each entry of ``rules`` with its severity, empty for the code's own severity.
 
-    A code is off if its entry was refused, or if its limit is not in ``limits``, because the
-    default would be wrong.
+    A code is off if its entry was rejected or its limit is not in ``limits``, because its default
+    limit would be wrong.
     """
     for section, level in sorted(validated.broken):
         if section == "rules" and (code := code_of(level)) and can_be_allowed(code):
@@ -201,20 +203,24 @@ def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[s
 
 
 def _nulls(source: Source) -> list[SpecRefusal]:
-    """Return a refusal of each key and item without a value.
+    """Return a refusal for each key and item without a value.
 
-    Null is only valid in an overlay, where it removes a value.
+    Null is valid only in an overlay, where it removes a value.
     """
-    found: list[SpecRefusal] = []
+    refusals: list[SpecRefusal] = []
 
     def visit(value: Any, path: Path) -> None:
         for step, item in value.items() if isinstance(value, dict) else enumerate(value):
-            at = (*path, step)
+            path_of_value = (*path, step)
             if isinstance(item, (dict, list)):
-                visit(item, at)
+                visit(item, path_of_value)
             elif item is None and isinstance(value, list):
                 message = "an item of the list has no value"
-                found.append(SpecRefusal("TF006", at, message, "give a value, or remove the item"))
+                refusals.append(
+                    SpecRefusal(
+                        "TF006", path_of_value, message, "give a value, or remove the item"
+                    )
+                )
             elif item is None and not is_for_later(path):
                 message = f"{step} has no value"
                 advice = f"write {step}: {{}}, remove it, or indent what belongs to it"
@@ -222,23 +228,23 @@ def _nulls(source: Source) -> list[SpecRefusal]:
                     advice = "decimals take a point, such as 1.5 kg; or a mapping is not closed"
                 elif glued := _WITHOUT_SPACE.fullmatch(str(step)):
                     advice = f"a space belongs after the colon: {glued[1]}: {glued[2]}"
-                found.append(SpecRefusal("TF006", at, message, advice, on_key=True))
+                refusals.append(SpecRefusal("TF006", path_of_value, message, advice, on_key=True))
 
     if source.has_nulls:
         visit(source.data, ())
-    return found
+    return refusals
 
 
-#: A key and its value without a space, unlike the name of a frame with a colon, such as
-#: tag36h11:7.
+#: A key and its value without a space between them. A frame's name with a colon, such as
+#: tag36h11:7, is no match.
 _WITHOUT_SPACE = re.compile(r"([a-z_]+):(\S+)")
-#: The part after the comma of a quantity such as 1,5 kg.
+#: The part after the comma in a quantity such as 1,5 kg.
 _AFTER_A_COMMA = re.compile(r"\d+(\s*[a-zA-Z°/^0-9]+)?")
 
 
 def _findings(refusals: Iterable[SpecRefusal], source: Source) -> list[Finding]:
-    """Return the findings, each once.
+    """Return the findings without duplicates.
 
-    A fault in an anchor would otherwise be reported again at each alias.
+    Otherwise, a fault in an anchor would be reported again for each alias.
     """
     return list(dict.fromkeys(refusal.finding(source) for refusal in refusals))

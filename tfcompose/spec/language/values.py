@@ -1,7 +1,4 @@
-"""The simple values of the language.
-
-Strings, lists, numbers in a row, and short forms of mappings.
-"""
+"""Simple values of the language: strings, lists, rows of numbers, and short forms of mappings."""
 
 from __future__ import annotations
 
@@ -37,10 +34,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """Annotates a string that must match a pattern in full."""
+    """Annotates a string that must match a pattern completely."""
 
     pattern: str
-    #: The pattern in words.
+    #: A description of the pattern.
     means: str
 
     def check(self, value: str) -> str:
@@ -64,7 +61,7 @@ class Matches:
 
 @dataclass(frozen=True, slots=True)
 class Computable:
-    """Annotates a value that an expression may give."""
+    """Annotates a value that may be the result of an expression."""
 
     #: Converts an expression's result to the value.
     plain: Callable[[Any], Any]
@@ -78,7 +75,7 @@ class Computable:
         return {"anyOf": [handler(schema), COMPUTED]}
 
 
-#: The JSON Schema of a value that is one expression.
+#: The JSON Schema of a value that is a single expression.
 COMPUTED = {"type": "string", "pattern": f"^{EXPRESSION}"}
 
 
@@ -86,7 +83,7 @@ _AXES = ("x", "y", "z")
 _ANGLES = ("roll", "pitch", "yaw")
 _ITEM = re.compile(
     r"[^\s,]*\d[^\s,]*(?:\s+[^\s\d,.+-]+)?"
-)  # a number with its unit, which may be apart
+)  # a number with an optional unit, which a space may precede
 _OF_A_POSE = 6
 
 
@@ -103,7 +100,7 @@ class InARow:
         """Return the list.
 
         Raises:
-            PydanticCustomError: if it is none, or of another length.
+            PydanticCustomError: if the value is not a list of this length.
         """
         if isinstance(value, list) and len(value) == self.count:
             return value
@@ -116,9 +113,9 @@ class InARow:
     def _advice(self, value: Any) -> str:
         """Return what to write instead.
 
-        What may be meant by a string, a mapping, or numbers with decimal commas.
+        The advice interprets a string, a mapping, or numbers with decimal commas.
         """
-        if isinstance(value, dict) and value.keys() == {"size"}:  # as URDF's box has it
+        if isinstance(value, dict) and value.keys() == {"size"}:  # as in URDF's box
             inner = value["size"]
             is_complete = isinstance(inner, list) and len(inner) == self.count
             return f"write [{', '.join(map(str, inner))}]" if is_complete else self._advice(inner)
@@ -148,19 +145,22 @@ class InARow:
 
 
 def short(name: str, of: Any) -> BeforeValidator:
-    """Return what lets a string stand for a mapping of the type ``of`` with only that key."""
+    """Return a validator that lets a string replace a mapping with only the key ``name``.
+
+    ``of`` is the type of the mapping.
+    """
     return BeforeValidator(
         lambda value: {name: value} if isinstance(value, str) else value, str | of
     )
 
 
 def as_list(value: Any) -> Any:
-    """Return a list, for which one item may stand."""
+    """Return a list. A single item becomes a list of length 1."""
     return value if isinstance(value, list) else [value]
 
 
 def plain(value: Any) -> Any:
-    """Return data as they are passed on: a computed quantity is its number."""
+    """Return data to pass on. A computed quantity becomes its number."""
     if isinstance(value, (Quantity, Truth)):
         return value.value
     if isinstance(value, dict):
@@ -199,7 +199,7 @@ def _names_a_variable(name: str) -> str:
 
 
 def _with_opacity(value: Any) -> Any:
-    """Return a colour's four parts for its name, or for its first three."""
+    """Return four components of a colour, from its name or from three or four components."""
     if isinstance(value, str):
         if value not in COLOURS:
             advice = did_you_mean(
@@ -243,8 +243,7 @@ def _day(value: Any) -> date:
         raise invalid("TF103", f"{format_value(value)} is not a day", advice) from None
 
 
-#: Colours that have names, in red, green and blue: those of HTML 4 and three that robots often
-#: have.
+#: Named colours as red, green and blue: the names of HTML 4, and three that are common in robots.
 COLOURS = {
     "black": (0.0, 0.0, 0.0),
     "silver": (0.75, 0.75, 0.75),
@@ -270,16 +269,16 @@ COLOURS = {
 Anything = Annotated[Any, BeforeValidator(plain)]
 NoMapping = Annotated[Anything, Field(json_schema_extra={"not": {"type": "object"}})]
 Parameters = dict[str, Anything]
-#: Read before the keys are: whether an entry is there, and how often.
+#: A condition. It is evaluated before the entry's other keys are read.
 Condition = Annotated[Any, BeforeValidator(lambda value: value, bool | str)]
 Loops = Annotated[
     Any, BeforeValidator(lambda value: value, dict[str, str | tuple[str | float | bool, ...]])
 ]
 Text = Annotated[str, Strict()]
-#: True or false, which may be computed.
+#: A boolean, which may be computed.
 Boolean = Annotated[bool, Strict(), Computable(_truth)]
 OnlyTrue = Annotated[bool, BeforeValidator(_is_true), Field(json_schema_extra={"const": True})]
-#: Annotates a whole number, which may be computed.
+#: Annotates an integer, which may be computed.
 Integral = Computable(_integral)
 Name = Annotated[
     Text, Matches(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")
@@ -305,7 +304,7 @@ TopicName = Annotated[
         "the name of a topic or a service: letters, digits, _ and /",
     ),
 ]
-#: What stands before or after := in a remapping; it may be computed.
+#: A name on either side of := in a remapping; it may be computed.
 RosName = Annotated[
     Text,
     Matches(
@@ -313,18 +312,18 @@ RosName = Annotated[
         "a name that can be remapped: without spaces, and without :=",
     ),
 ]
-#: A variable of the environment.
+#: The name of an environment variable.
 VariableName = Annotated[Text, AfterValidator(_names_a_variable)]
 Texts = tuple[Text, ...]
 Day = Annotated[date, Strict(), BeforeValidator(_day)]
-#: A list of strings, or one string for a list of one.
+#: A list of strings, or a single string instead of a list.
 OneOrMore = TypeAliasType("OneOrMore", Annotated[Texts, BeforeValidator(as_list, Text | Texts)])
 Xyz = TypeAliasType("Xyz", Annotated[tuple[Length, Length, Length], InARow(3, "[0.2, 0, 30 cm]")])
 Sizes = Annotated[tuple[Size, Size, Size], InARow(3, "[0.5, 0.4, 0.15]")]
 Numbers = Annotated[tuple[Number, Number, Number], InARow(3, "[0, 0, 1]")]
 Axis = Annotated[Numbers, AfterValidator(_has_direction)]
 _Factors = Annotated[tuple[Number, Number, Number], InARow(3, "[0.001, 0.001, 0.001]")]
-#: Three factors, or one for all three; a negative one mirrors.
+#: Three factors, or a single factor for all axes. A negative factor mirrors.
 Scale = Annotated[
     _Factors,
     AfterValidator(_is_visible),
@@ -336,7 +335,7 @@ _ColourPart = Annotated[Number, AfterValidator(_colour_part)]
 _Rgba = Annotated[
     tuple[_ColourPart, _ColourPart, _ColourPart, _ColourPart], InARow(4, "[0.2, 0.4, 0.8, 1]")
 ]
-#: Red, green, blue and opacity; without opacity, or a name, the colour is opaque.
+#: Red, green, blue and opacity. A colour without opacity, or a named colour, is opaque.
 Colour = TypeAliasType(
     "Colour",
     Annotated[

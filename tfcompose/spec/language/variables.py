@@ -1,6 +1,6 @@
 """``vars``, ``args`` and ``${…}``.
 
-Computed first, so that a computed value is checked like a written one.
+They are computed before validation, so computed values are checked like literal values.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path, Source
 
 
-def unused_variables(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str, str], ...]:
-    """Return the variables and arguments that no ``${…}`` in ``data`` or ``aside`` names."""
+def unused_variables(data: dict[str, Any], profiles: Any = None) -> tuple[tuple[str, str], ...]:
+    """Return variables and arguments that no ``${…}`` in ``data`` or ``profiles`` names."""
     declared: dict[str, tuple[str, str]] = {}
     for section, prefix in (("vars", ""), ("args", "args.")):
         names = data.get(section)
@@ -42,7 +42,7 @@ def unused_variables(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str
             if isinstance(names, dict)
             else {}
         )
-    used = set(_names(data)) | set(_names(aside)) if declared else set()
+    used = set(_names(data)) | set(_names(profiles)) if declared else set()
     return tuple(path for name, path in declared.items() if name not in used)
 
 
@@ -62,7 +62,7 @@ def _names(value: Any) -> Iterator[str]:
 def _fill_value(value: Any, path: Path, variables: Variables) -> Any:
     """Return the value with expressions computed.
 
-    The same object where it holds none, so that aliases stay one.
+    A value without expressions is returned as the same object, so that aliases stay identical.
     """
     if isinstance(value, str):
         return variables.fill(value, path) if "${" in value else value
@@ -88,16 +88,16 @@ def _call(functions: str) -> str:
     return rf"\$\{{\s*({functions})\(\s*([^(){{}}]*?)\s*\)\s*\}}"
 
 
-#: What is known only when frames are named: a function, and its argument.
+#: Calls of functions whose result is known only later, with their arguments.
 CALLS = re.compile(_call("frame|file"))
-#: What a process is told, and what is known then, or when it is started.
+#: Expressions in texts for a process that are computed when names are final or the process starts.
 LATER = re.compile(rf"{CALLS.pattern}|\$\{{\s*(?:params_file|build_dir)\s*\}}")
-#: In what a xacro file is given: a file beside the robot file, which xacro would look for beside
-#: its own.
+#: In arguments of a xacro file: a path relative to the robot file. xacro would search relative to
+#: its own file.
 OF_FILES = re.compile(_call("file"))
 
 
-#: A block may hold what is for another program to fill in.
+#: Advice for a raw block with ``${…}`` for another program.
 _LITERALLY = """what others fill in: ${dollar}{…}, with vars: {dollar: "$"}"""
 
 
@@ -112,19 +112,19 @@ def _is_for_xacro(path: Path) -> bool:
 
 
 class NothingNewError(ExpressionError):
-    """A variable has been refused already.
+    """A variable has already been rejected.
 
-    What needs it is broken too, and that is not said again.
+    Values that need it are also broken, which is not reported again.
     """
 
 
 class Variables:
-    """The variables and arguments of a robot file, and what is computed from them.
+    """The variables and arguments of a robot file, and the computation of expressions.
 
-    ``refusals`` are what was refused, ``findings`` what is wrong with values that arguments were
-    given, and ``uncomputed`` the paths of what could not be computed. ``args`` holds the
-    arguments' values, None where one was refused, and ``environment`` what the variables that
-    ``env`` names were, or what stood for them.
+    ``refusals`` are rejected values, ``findings`` are about values of arguments, and
+    ``uncomputed`` are paths of values that could not be computed. ``args`` holds the arguments'
+    values, None for a rejected argument. ``environment`` holds the values of variables that
+    ``env`` names, or their defaults.
     """
 
     def __init__(self, source: Source, inputs: BuildInputs) -> None:
@@ -134,7 +134,7 @@ class Variables:
         self.refusals: list[SpecRefusal] = []
         self.findings: list[Finding] = []
         self.uncomputed: list[Path] = []
-        self.known: dict[str, Value | None] = {}  # None: it was refused
+        self.values: dict[str, Value | None] = {}  # None for a rejected variable
         self.args: dict[str, Value | None] = {}
         self.environment: dict[str, str] = {}
         self.open: list[str] = []
@@ -147,11 +147,9 @@ class Variables:
     ) -> dict[str, Any]:
         """Return the data with every ``${…}`` computed.
 
-        ``scopes`` are values by name for what is below some paths.
-
-        What is one expression becomes a ``Quantity``, a ``Truth`` or a string. What could not be
-        computed stays as it is; there is no second refusal of what only needs a variable that was
-        refused.
+        ``scopes`` holds values of loop variables by path; they apply below that path. A value that
+        is a single expression becomes a ``Quantity``, a ``Truth`` or a string. A value that cannot
+        be computed stays as it is. If it only needs a rejected variable, it is not rejected again.
         """
         self.scopes = scopes
         filled = {
@@ -162,25 +160,25 @@ class Variables:
     def _read_args(self) -> None:
         """Read the arguments in order.
 
-        The default of one may name those before it, and ``env``.
+        The default of an argument may use earlier arguments and ``env``.
         """
         declared = self.source.mapping("args")
         for name, raw in declared.items():
             self.args[name] = self._arg(name, raw) if raw is not None else None
         for name, supplied in self.outside.args.items():
             if name not in declared:
-                there = (
+                otherwise = (
                     f"its args are {', '.join(declared)}"
                     if declared
                     else f"{self.source.file} has no args"
                 )
-                advice = did_you_mean(name, declared, there)
+                advice = did_you_mean(name, declared, otherwise)
                 self.findings.append(
                     finding("TF016", f"unknown argument {name}", supplied.span, help=advice)
                 )
 
     def _arg(self, name: str, raw: Any) -> Value | None:
-        """Return the argument's value, or None after noting why it has none."""
+        """Return the argument's value, None after recording why it has none."""
         path: Path = ("args", name)
         declared = dict(full(raw))
         default = declared.get("default")
@@ -192,7 +190,7 @@ class Variables:
         try:
             spec = ArgSpec.model_validate(declared)
         except ValidationError:
-            return None  # it is refused where the whole is read
+            return None  # validation of the file rejects it
         supplied = self._supplied_arg(name, spec)
         notes = [Note(f"args.{name} is declared here", self.source.key_span(path))]
         if supplied is None and spec.default is None:
@@ -207,7 +205,7 @@ class Variables:
         try:
             return spec.value(spec.default if supplied is None else supplied.value)
         except ArgError as error:
-            if supplied:  # else its default is refused where the whole is read
+            if supplied:  # otherwise validation rejects the default
                 self.findings.append(
                     finding(
                         error.code,
@@ -229,9 +227,9 @@ class Variables:
         return ArgValue(value, Span(f"{spec.env}={value}"))
 
     def _read_all(self) -> None:
-        """Compute every variable, first those that it needs.
+        """Compute every variable after the variables that it needs.
 
-        Without recursion, however long the chain.
+        The computation does not recurse, so chains may be long.
         """
         for first in self.declared:
             self.open = [first]
@@ -241,7 +239,7 @@ class Variables:
                     (
                         name
                         for name in waiting[-1]
-                        if name not in self.known and name not in self.open
+                        if name not in self.values and name not in self.open
                     ),
                     None,
                 )
@@ -256,24 +254,24 @@ class Variables:
     def _names_in(self, name: str) -> Iterator[str]:
         value = self.declared[name]
         names = names_in(value) if isinstance(value, str) else []
-        return iter([other for other in names if other in self.declared])
+        return iter([variable for variable in names if variable in self.declared])
 
     def _read(self, name: str) -> None:
-        if name in self.known:
+        if name in self.values:
             return
-        if self.declared[name] is None:  # a null is refused as such
-            self.known[name] = None
+        if self.declared[name] is None:  # another check rejects a null
+            self.values[name] = None
             return
         try:
-            self.known[name] = self._value(name, self.declared[name])
+            self.values[name] = self._value(name, self.declared[name])
         except ExpressionError as error:
-            self.known[name] = None
+            self.values[name] = None
             self._refuse(error, ("vars", name))
 
     def fill(self, text: str, path: Path, lookup: Callable[[str], Value] | None = None) -> Any:
-        """Return the text with every ``${…}`` computed, or, after noting why, as it is.
+        """Return the text with every ``${…}`` computed; on failure record why and return the text.
 
-        The path is the text's.
+        ``path`` is the path of the text.
         """
         try:
             later = LATER if _is_of_a_process(path) else OF_FILES if _is_for_xacro(path) else None
@@ -294,7 +292,7 @@ class Variables:
         return self.within(scope) if scope else self.lookup
 
     def value_in(self, text: str, scope: Mapping[str, Value]) -> Value:
-        """Return a text with every ``${…}`` computed, names looked up in the scope first.
+        """Return a text with every ``${…}`` computed. Names are looked up in ``scope`` first.
 
         Raises:
             ExpressionError: if it cannot be computed.
@@ -302,21 +300,21 @@ class Variables:
         return fill(text, self.within(scope))
 
     def within(self, scope: Mapping[str, Value]) -> Callable[[str], Value]:
-        """Return what looks names up in the scope first."""
+        """Return a lookup function that searches ``scope`` first."""
         return lambda name: scope[name] if name in scope else self.lookup(name)
 
     def lookup(self, name: str) -> Value:
         """Return the value of a variable, of ``args.NAME``, or of ``env(NAME, default)``.
 
         Raises:
-            ExpressionError: if there is none.
+            ExpressionError: if there is no such value.
         """
         if name.startswith("args."):
             return self._lookup_arg(name.removeprefix("args."))
         if (named := environment_in(name)) is not None:
             return self._lookup_environment(*named)
-        if name in self.known:
-            value = self.known[name]
+        if name in self.values:
+            value = self.values[name]
             if value is None:
                 raise NothingNewError(name)
             return value
@@ -327,8 +325,12 @@ class Variables:
             raise ExpressionError(f"{name} is {RESERVED[name]}", A_FILE)
         if name == "math.pi":
             raise ExpressionError(f"unknown variable {name}", "write pi")
-        there = f"vars has {', '.join(self.declared)}" if self.declared else "the file has no vars"
-        raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.declared, there))
+        otherwise = (
+            f"vars has {', '.join(self.declared)}" if self.declared else "the file has no vars"
+        )
+        raise ExpressionError(
+            f"unknown variable {name}", did_you_mean(name, self.declared, otherwise)
+        )
 
     def _lookup_arg(self, name: str) -> Value:
         if name in self.args:
@@ -340,8 +342,8 @@ class Variables:
             raise ExpressionError(
                 f"the argument {name} is declared further down", f"declare {name} first"
             )
-        there = f"args has {', '.join(self.args)}" if self.args else "the file has no args"
-        raise ExpressionError(f"unknown argument {name}", did_you_mean(name, self.args, there))
+        otherwise = f"args has {', '.join(self.args)}" if self.args else "the file has no args"
+        raise ExpressionError(f"unknown argument {name}", did_you_mean(name, self.args, otherwise))
 
     def _lookup_environment(self, name: str, default: str | None) -> Value:
         value = self.outside.environment.get(name, default)
@@ -378,4 +380,4 @@ class Variables:
             return value
         return (
             value if read.dimension == NUMBER else read
-        )  # a number in quotes is a text, such as a serial number
+        )  # a quoted number is a string, such as a serial number

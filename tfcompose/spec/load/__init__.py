@@ -1,7 +1,7 @@
-"""Reads text into plain data: a ``Source`` has the data, and the span of each key and value.
+"""Reads text into plain data. A ``Source`` has the data and the span of each key and value.
 
-YAML robot files, calibration files and parameter files of ROS; text comes from the caller. Must
-not import ``language``, ``model``, ``plan``, ``pydantic``: it knows no key of the language.
+It reads YAML robot files, calibration files and parameter files of ROS. Callers pass in the text.
+Must not import ``language``, ``model``, ``plan``, ``pydantic``: it knows no key of the language.
 """
 
 from tfcompose.spec.load.nodes import DEEPEST, Location, Path

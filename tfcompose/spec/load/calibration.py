@@ -1,9 +1,7 @@
-"""Calibration files as plain data with places.
+"""Calibration files as plain data with spans.
 
-YAML of one or several documents, rows of numbers, launch files.
-
-The bounds are those of robot files. xacro's tags ``!degrees`` and ``!radians`` are read here, on
-plain numbers.
+A file is YAML of one or several documents, rows of numbers, or a launch file. The size limits are
+those of robot files. xacro's tags ``!degrees`` and ``!radians`` are applied to plain numbers.
 """
 
 from __future__ import annotations
@@ -24,12 +22,12 @@ if TYPE_CHECKING:
 
 Form = Literal["yaml", "rows", "launch"]
 
-#: What one unit of each tag is, in radians.
+#: The unit of each tag, in radians.
 ANGLE_TAGS = {"!degrees": math.pi / 180, "!radians": 1.0}
 
 PUBLISHER = "static_transform_publisher"
 
-#: A matrix has four rows; what is much larger is none, and is not looked at as one.
+#: Limits for rows of numbers. A matrix has four rows. Larger texts are not read as a matrix.
 MOST_ROWS, LONGEST_ROW = 64, 1000
 
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
@@ -40,13 +38,13 @@ _PYTHON = re.compile(r"#[^\n]*|\"([^\"\n]*)\"|'([^'\n]*)'|[\[\]]")
 
 
 def load_calibration(text: str, file: str) -> tuple[Form, tuple[Source, ...]]:
-    """Return what the file is made of, and its documents.
+    """Return the form of the file, and its documents.
 
-    Rows of numbers are one document, a list of lists; a launch file is one, a list of the words of
-    each of its ``static_transform_publisher`` nodes.
+    Rows of numbers are a single document, a list of lists. A launch file is a single document: a
+    list with the command line of each of its ``static_transform_publisher`` nodes.
 
     Raises:
-        RejectedError: if the text is none of these, or larger than a file here can be.
+        RejectedError: if the text has none of these forms or is too large.
     """
     refuse_unreadable(text, file)
     lines = text.splitlines()
@@ -70,13 +68,13 @@ def _documents(text: str, file: str) -> Iterator[Source]:
     for data, location in reader.documents:
         if data is not None and (
             not isinstance(data, str) or data.strip()
-        ):  # ros2 topic echo ends with ---
+        ):  # output of ros2 topic echo ends with ---
             yield Source(file, location, data, findings=findings)
             findings = ()
 
 
 class _CalibrationReader(DocumentReader):
-    """Reads numbers with xacro's tags for angles too, in radians."""
+    """Also reads numbers with xacro's tags for angles, in radians."""
 
     def read_tagged(self, tag: str, text: str, location: Location) -> Any:
         """Return the value of a scalar with a tag."""
@@ -91,7 +89,7 @@ class _CalibrationReader(DocumentReader):
 
 
 class _LineOffsets:
-    """Where an offset in the text stands."""
+    """Converts offsets in the text to lines and columns."""
 
     def __init__(self, text: str, file: str) -> None:
         self.file = file
@@ -121,15 +119,15 @@ def _rows(lines: list[str], file: str) -> Source:
 
 
 def _launch(text: str, file: str) -> Source:
-    """Return the words of each static_transform_publisher.
+    """Return the command line of each static_transform_publisher.
 
-    What stands in comments is left out, nothing is run.
+    Comments are ignored, and no code is run.
     """
     lines = _LineOffsets(text, file)
     places: dict[str | int, Location] = {}
     data: Any = []
-    found = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)
-    for tokens in found:
+    calls = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)
+    for tokens in calls:
         if not tokens:
             continue
         inside = {
@@ -157,7 +155,7 @@ def _in_xml(text: str) -> Iterator[list[tuple[str, int, int]]]:
 
 
 def _in_python(text: str) -> Iterator[list[tuple[str, int, int]]]:
-    """Yield the texts of the list that follows each mention of the publisher."""
+    """Yield the strings of the list that follows each mention of the publisher."""
     tokens: list[tuple[str, int, int]] = []
     named = inside = False
     for token in _PYTHON.finditer(text):

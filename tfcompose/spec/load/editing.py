@@ -1,6 +1,6 @@
-"""Inserting values into YAML text.
+"""Insertion of values into YAML text.
 
-A key into a mapping that is there, in the style of that mapping.
+A key is inserted into an existing mapping, in the style of that mapping.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def text_at(text: str, span: Span) -> str:
-    """Return what stands at a span of the text."""
+    """Return the text at a span."""
     begin, end = _offsets(text, span)
     return text[begin:end]
 
@@ -30,14 +30,14 @@ def _offsets(text: str, span: Span) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class MappingKeys:
-    """The keys that stand in one mapping of a file's text, without those that ``<<`` brings."""
+    """The keys of a mapping in a file's text, without keys that ``<<`` adds."""
 
     text: str
     mapping: Location
 
     @property
-    def own(self) -> list[str]:
-        """The keys that stand in the mapping itself, in order."""
+    def own_keys(self) -> list[str]:
+        """The keys in the mapping itself, in order."""
         inside = [
             name for name, key in self.mapping.keys.items() if self.mapping.span.holds(key.span)
         ]
@@ -45,14 +45,14 @@ class MappingKeys:
 
     @property
     def is_flow(self) -> bool:
-        """Whether it is a mapping in braces."""
+        """Whether the mapping is in braces."""
         return "{" in text_at(self.text, self.mapping.span)[:1] or self._opening != -1
 
     @property
     def _opening(self) -> int:
-        """Where the brace opens in the mapping's text, behind an anchor or a tag.
+        """The index of the opening brace in the mapping's text, after an anchor or a tag.
 
-        −1: it is no flow mapping.
+        -1 if the mapping is not in braces.
         """
         text = text_at(self.text, self.mapping.span)
         brace = text.find("{")
@@ -60,15 +60,17 @@ class MappingKeys:
         return brace if all(token[:1] in {"&", "!"} for token in tokens) else -1
 
     def insertion(self, values: Mapping[str, str], after: tuple[str, ...] = ()) -> Edit:
-        """Return the edit that adds keys after the last of the keys ``after`` that exists."""
-        own = self.own
-        known = [name for name in own if name in after] or [
-            name for name in own if name in self.mapping.inside
+        """Return the edit that inserts keys after the last existing key among ``after``."""
+        keys = self.own_keys
+        neighbours = [name for name in keys if name in after] or [
+            name for name in keys if name in self.mapping.inside
         ]
         if self.is_flow:
-            return self._in_braces(values, known[-1] if known else None, is_empty=not own)
-        key = self.mapping.keys[known[-1] if known else own[-1]].span
-        line = self._line_behind(known[-1]) if known else key.line
+            return self._in_braces(
+                values, neighbours[-1] if neighbours else None, is_empty=not keys
+            )
+        key = self.mapping.keys[neighbours[-1] if neighbours else keys[-1]].span
+        line = self._line_behind(neighbours[-1]) if neighbours else key.line
         lines = "".join(
             f"{' ' * (key.column - 1)}{name}: {value}\n" for name, value in values.items()
         )
@@ -78,9 +80,9 @@ class MappingKeys:
         new = ", ".join(f"{name}: {value}" for name, value in values.items())
         span = self.mapping.span
         if behind is not None:
-            at = self.mapping.inside[behind].span
-            if span.holds(at):
-                end = at.end_line, at.end_column
+            before = self.mapping.inside[behind].span
+            if span.holds(before):
+                end = before.end_line, before.end_column
                 return Edit(Span(span.file, *end, *end), f", {new}")
         begin, end_offset = _offsets(self.text, span)
         stripped = begin + len(self.text[begin : end_offset - 1].rstrip())
@@ -90,10 +92,10 @@ class MappingKeys:
         return Edit(Span(span.file, line, column, line, column), new if is_empty else f", {new}")
 
     def _line_behind(self, name: str) -> int:
-        """Return the line before which a new key can stand that comes behind the one of this name.
+        """Return the line before which to insert a new key after the key ``name``.
 
-        A collection in block style ends where the next thing begins, behind comments; then it is
-        the key's own line.
+        A block-style collection ends where the next item begins, after comments. In that case,
+        return the line of the key itself.
         """
         key, value = self.mapping.keys[name].span, self.mapping.inside[name].span
         is_alias = (value.line, value.column) < (
@@ -108,18 +110,18 @@ class MappingKeys:
 
 
 def with_value(text: str, file: str, path: Path, values: Mapping[str, str | None]) -> str:
-    """Return the text with YAML values in the mapping at ``path``, made if missing.
+    """Return the text with YAML values set in the mapping at ``path``.
 
-    Those that are there are replaced; None stands for ``null``, which removes the key in an
-    overlay. The text is an overlay's, or empty.
+    The mapping is created if it is missing. Existing values are replaced. None is written as
+    ``null``, which removes the key in an overlay. ``text`` is the text of an overlay, or empty.
 
     Raises:
         RejectedError: if the text is not YAML.
     """
-    shown = {key: value for key, value in values.items() if value is not None}
-    shown = {key: shown.get(key, "null") for key in values}
+    items = {key: value for key, value in values.items() if value is not None}
+    items = {key: items.get(key, "null") for key in values}
     if not any(line.strip() and not line.lstrip().startswith("#") for line in text.splitlines()):
-        return text + _block(path, shown, 0)
+        return text + _block(path, items, 0)
     location, depth = load(text, file).places, 0
     while (
         depth < len(path)
@@ -128,18 +130,18 @@ def with_value(text: str, file: str, path: Path, values: Mapping[str, str | None
     ):
         location, depth = below, depth + 1
     keys = MappingKeys(text, location)
-    there = [key for key in shown if key in location.inside] if depth == len(path) else []
-    edits = [Edit(location.inside[key].span, shown[key]) for key in there]
-    rest = {key: value for key, value in shown.items() if key not in there}
+    existing = [key for key in items if key in location.inside] if depth == len(path) else []
+    edits = [Edit(location.inside[key].span, items[key]) for key in existing]
+    rest = {key: value for key, value in items.items() if key not in existing}
     if depth < len(path):
-        rest = {str(path[depth]): _flow(path[depth + 1 :], shown)}
+        rest = {str(path[depth]): _flow(path[depth + 1 :], items)}
     if rest and depth < len(path) and not keys.is_flow:
-        indent = location.keys[keys.own[0]].span.column - 1
-        first = location.keys[keys.own[0]].span
+        indent = location.keys[keys.own_keys[0]].span.column - 1
+        first = location.keys[keys.own_keys[0]].span
         span = Span(file, first.line, 1, first.line, 1)
         if depth == 0:
-            return _with_newline(text) + _block(path, shown, 0)
-        edits.append(Edit(span, _block(path[depth:], shown, indent)))
+            return _with_newline(text) + _block(path, items, 0)
+        edits.append(Edit(span, _block(path[depth:], items, indent)))
     elif rest:
         edits.append(keys.insertion(rest))
     result = apply_edits(text, edits)

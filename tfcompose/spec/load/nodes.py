@@ -1,9 +1,9 @@
-"""YAML text as plain data with the place of every key and value, from parser events.
+"""YAML text as plain data with the location of every key and value, from parser events.
 
-PyYAML's own composer recurses in C and a deeply nested text ends the interpreter; this one has a
-stack of its own and stops at a depth that no robot needs. Nothing is constructed by tags, no code
-is run. An alias *is* the value that it names, so a bomb of aliases stays small here, and what
-reads the data can see that it has read a value before.
+PyYAML's own composer recurses in C, so a deeply nested text crashes the interpreter. This reader
+keeps its own stack, and stops at a depth that no robot file reaches. Tags construct no objects and
+run no code. An alias yields the same object as its anchor. So a text with exponentially many
+aliases stays small, and code that reads the data can recognise a value that it has already read.
 """
 
 from __future__ import annotations
@@ -33,28 +33,29 @@ if TYPE_CHECKING:
 
 
 DEEPEST = 40
-MOST_VALUES = 400_000  # with those that aliases stand for
+MOST_VALUES = 400_000  # including values inside aliases
 
-#: NUL, which no file name, argument or variable can hold, and halves of characters, which no file
-#: can.
+#: NUL, which file names, arguments and environment variables cannot contain, and lone surrogates,
+#: which files cannot contain.
 _FORBIDDEN = re.compile("[\0\ud800-\udfff]")
 
-#: A key that swallowed the beginning of its value: ``mast {parent``, ``mast:{parent``.
+#: A key that contains the beginning of its value: ``mast {parent``, ``mast:{parent``.
 _GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
 
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
-#: What the C parser of PyYAML 6.0.4 says at its thousandth level. A bracket may begin a key, so it
-#: has read ahead, up to the line's end or for 1,024 characters, and has yielded fewer levels than
-#: ``DEEPEST``.
+#: Error of PyYAML 6.0.4's C parser at 1,000 levels. An opening bracket may begin a key, so the
+#: parser reads ahead to the end of the line, or for 1,024 characters, before it yields the
+#: bracket. It can therefore fail before it has yielded ``DEEPEST`` levels.
 _TOO_DEEP = "exceeded maximum nesting depth"
-_READ_AHEAD = 900  # characters: less than it has read ahead, by more than ``DEEPEST`` levels
+_READ_AHEAD = 900  # characters: 1,024, less room for more than ``DEEPEST`` brackets
 
 
 def parse_events(text: str) -> Iterator[Any]:
-    """Yield the parser's events, more than ``DEEPEST`` levels before it refuses a text for depth.
+    """Yield the parser's events.
 
-    So a reader that stops there stops at the same place, whichever version of PyYAML there is.
+    If PyYAML rejects a text as too deep, more than ``DEEPEST`` levels are yielded first. A reader
+    that stops at ``DEEPEST`` therefore stops at the same place with every version of PyYAML.
 
     Raises:
         yaml.YAMLError: if it is not YAML.
@@ -67,34 +68,34 @@ def parse_events(text: str) -> Iterator[Any]:
     except yaml.MarkedYAMLError as error:
         if error.problem != _TOO_DEEP or error.problem_mark is None:
             raise
-        # With a line break there, no bracket before it begins a key, and all are yielded at once.
+        # After a line break, no earlier bracket can begin a key, so the parser yields them all.
         end = error.problem_mark.index - _READ_AHEAD
         try:
             yield from islice(
                 yaml.parse(f"{text[:end]}\n{text[end:]}", Loader=_LOADER), count, None
             )
-        except yaml.MarkedYAMLError as other:
-            other.problem_mark = error.problem_mark  # without the line break
+        except yaml.MarkedYAMLError as second_error:
+            second_error.problem_mark = error.problem_mark  # without the line break
             raise
 
 
 @dataclass(slots=True)
 class _Part:
-    """A finished value that has a name.
-
-    How many values and levels it holds, and what was found in it.
-    """
+    """A complete value with an anchor."""
 
     value: Any
     location: Location
+    #: Number of values, itself included.
     size: int = 1
+    #: Number of nested levels; 0 for a scalar.
     height: int = 0
+    #: Findings inside the value.
     findings: list[Finding] = field(default_factory=list)
 
 
 @dataclass(slots=True)
 class _Open:
-    """A mapping or list that is being read."""
+    """A mapping or list whose content is being read."""
 
     data: Any
     start: yaml.CollectionStartEvent
@@ -107,27 +108,26 @@ class _Open:
     merges: tuple[tuple[Any, Location], ...] = ()
     size: int = 1
     height: int = 0
-    #: The key whose value comes next.
+    #: The key of the next value.
     key: str = ""
     is_merge: bool = False
-    #: Whether to keep that value.
+    #: Whether to keep the next value.
     keeps: bool = True
     found_before_value: int = 0
 
     def is_aside(self, key: str) -> bool:
-        """Whether the key stands at the top and holds nothing but anchors."""
+        """Return whether this is a top-level ``x-`` key, which only serves to hold anchors."""
         return self.is_root and key.startswith("x-")
 
 
 class DocumentReader:
-    """Reads the documents of one text.
-
-    ``findings`` is what was wrong, ``has_nulls`` whether a value is null.
-    """
+    """Reads the documents of a text."""
 
     def __init__(self, file: str) -> None:
         self.file = file
+        #: Faults of the text.
         self.findings: list[Finding] = []
+        #: Whether a value is null.
         self.has_nulls = False
         self.documents: list[tuple[Any, Location]] = []
         self._anchors: dict[str, _Part | None] = {}
@@ -136,15 +136,15 @@ class DocumentReader:
         self._size = 0
 
     def read(self, text: str, *, single: bool = True) -> None:
-        """Read the text; with ``single`` it is one document.
+        """Read the text; with ``single``, a second document is an error.
 
         Raises:
-            RejectedError: where the text stops being YAML, is too deep, or too large.
+            RejectedError: if the text is not YAML, too deep or too large.
         """
         try:
             for event in parse_events(text):
                 kind = type(event)
-                if kind is ScalarEvent:  # most of them are
+                if kind is ScalarEvent:  # the most frequent kind
                     self._scalar(event)
                 elif kind is MappingStartEvent or kind is SequenceStartEvent:
                     self._open(event, is_mapping=kind is MappingStartEvent)
@@ -163,7 +163,7 @@ class DocumentReader:
             raise RejectedError([finding("TF001", message, Span(self.file))]) from None
         self.findings = list(
             dict.fromkeys(self.findings)
-        )  # an alias says again what its anchor said
+        )  # an alias repeats its anchor's findings
 
     def _begin(self, event: yaml.Event, *, single: bool) -> None:
         self._anchors = {}
@@ -196,7 +196,7 @@ class DocumentReader:
         """Return a scalar's value, and record its faults.
 
         Raises:
-            RejectedError: if it has a character that no text can hold.
+            RejectedError: if it contains a character that is forbidden in text.
         """
         tag, text = event.tag, event.value
         try:
@@ -204,7 +204,7 @@ class DocumentReader:
                 value: Any = plain(text)
                 self.has_nulls = self.has_nulls or value is None
                 return value
-            if _FORBIDDEN.search(text):  # written as an escape
+            if _FORBIDDEN.search(text):  # as an escape sequence
                 raise RejectedError(
                     [finding("TF002", "a character that no text can hold", location.span)]
                 )
@@ -222,10 +222,10 @@ class DocumentReader:
                     help="give a finite number; only a node's params may be .inf or .nan",
                 )
             )
-            return 1.0  # which sizes, masses and axes can be: one fault is one finding
+            return 1.0  # valid as size, mass or axis, so that the fault is reported once
 
     def _is_parameter(self) -> bool:
-        """Return whether what is read is below the parameters of a node."""
+        """Return whether the current value is below the parameters of a node."""
         keys = [part.key for part in self._stack]
         match keys[2:] if keys[:1] == ["profiles"] else keys:
             case (
@@ -237,7 +237,7 @@ class DocumentReader:
         return False
 
     def read_tagged(self, tag: str, text: str, location: Location) -> Any:
-        """Return the value of a scalar with a tag, and note what is wrong with it."""
+        """Return the value of a scalar with a tag, and record its faults."""
         if tag not in SCALAR_TAGS:
             self._unknown_tag(tag, location)
             return text
@@ -294,23 +294,23 @@ class DocumentReader:
             self._put(done.data, location, done.size, done.height)
 
     def _inherit(self, done: _Open, value: Any, location: Location) -> None:
-        """Take what ``<<`` names for the keys that the mapping does not have.
+        """Add the keys of the mappings that ``<<`` names, except those that are already set.
 
-        The first mapping that has a key wins.
+        If several of the mappings have a key, the first one wins.
         """
         steps = enumerate(value) if isinstance(value, list) else [(None, value)]
         for index, source in steps:
-            at = location if index is None else location.inside[index]
+            inner = location if index is None else location.inside[index]
             if not isinstance(source, dict):
                 message = "<< takes a mapping, or a list of mappings"
-                self.findings.append(finding("TF011", message, at.span))
+                self.findings.append(finding("TF011", message, inner.span))
                 continue
             for key, item in source.items():
                 if key not in done.data and not done.is_aside(key):
                     done.data[key], done.inside[key], done.keys[key] = (
                         item,
-                        at.inside[key],
-                        at.keys[key],
+                        inner.inside[key],
+                        inner.keys[key],
                     )
 
     def _alias(self, event: yaml.AliasEvent) -> None:
@@ -322,7 +322,7 @@ class DocumentReader:
             why = (
                 f"nested deeper than {DEEPEST} levels"
                 if part
-                else "an alias stands inside what it names"
+                else "an alias is inside the value that it names"
             )
             raise self._refuse(why, self._location_of(event))
         top = self._stack[-1]
@@ -342,7 +342,7 @@ class DocumentReader:
         *,
         is_merge: bool = False,
     ) -> None:
-        """Take a key; ignore non-text, duplicate and anchor-only ones."""
+        """Record a key; values of invalid, duplicate and top-level ``x-`` keys are dropped."""
         top.key, top.waits_for_key, top.is_merge, top.keeps = key or "", False, is_merge, True
         if key is None:
             message = f"a key must be a string; this one is {what}"
@@ -350,7 +350,7 @@ class DocumentReader:
             top.keeps = False
         elif not key.isascii() and key.strip() != key:
             message = (
-                "a key begins or ends with a space that YAML does not take for one, such as a"
+                "a key begins or ends with a space that YAML does not recognise, such as a"
                 " no-break space"
             )
             self.findings.append(
@@ -384,7 +384,7 @@ class DocumentReader:
         top.found_before_value = len(self.findings)
 
     def _put(self, value: Any, location: Location, size: int, height: int) -> None:
-        """Put a finished value where it belongs."""
+        """Add a complete value to the mapping or list that contains it."""
         if not self._stack:
             self.documents.append((value, location))
             return
@@ -406,9 +406,9 @@ class DocumentReader:
 
 
 def _between(file: str, start: Any, end: Any) -> tuple[str, int, int, int, int]:
-    """Return the file, and lines and columns from 0.
+    """Return the file, and lines and columns counted from 0.
 
-    The parser's marks would all have to be kept.
+    Plain numbers allow Python to free the parser's marks.
     """
     return file, start.line, start.column, end.line, end.column
 
@@ -419,44 +419,44 @@ _NOTHING: Mapping[Any, Any] = {}
 
 
 class Location:
-    """The place of a value; of a mapping or list also those of its keys and items.
+    """The location of a value, and of the keys and items in it.
 
-    Most places are never asked for, and become a ``Span`` only then. Places do not change.
-    ``inside`` holds the places of the values by key or index, ``keys`` those of the keys; an alias
-    has the place of its anchor.
+    Most locations are never used, so ``span`` creates its ``Span`` on first use. Locations are
+    immutable. ``inside`` has the locations of values by key or index, and ``keys`` the locations
+    of keys. An alias has the location of its anchor.
     """
 
     __slots__ = ("_at", "inside", "keys")
 
     def __init__(
         self,
-        at: Span | tuple[str, int, int, int, int],
+        place: Span | tuple[str, int, int, int, int],
         inside: Mapping[Any, Location] = _NOTHING,
         keys: Mapping[Any, Location] = _NOTHING,
     ) -> None:
-        """``at`` is the place, or file, lines and columns of both ends, counted from 0."""
-        self._at = at
+        """Create a location from a span, or from a file and both ends' line and column from 0."""
+        self._at = place
         self.inside = inside
         self.keys = keys
 
     @property
     def span(self) -> Span:
-        """The place in the file."""
-        at = self._at
-        if isinstance(at, Span):
-            return at
-        file, line, column, end_line, end_column = at
+        """The span in the file."""
+        place = self._at
+        if isinstance(place, Span):
+            return place
+        file, line, column, end_line, end_column = place
         self._at = span = Span(file, line + 1, column + 1, end_line + 1, end_column + 1)
         return span
 
     def with_inside(
         self, inside: Mapping[Any, Location], keys: Mapping[Any, Location]
     ) -> Location:
-        """Return the same place with other places in it."""
+        """Return a location with the same span, and with other locations inside."""
         return Location(self._at, inside, keys)
 
     def get(self, path: Path) -> Location | None:
-        """Return the place of what is at ``path`` below, or None."""
+        """Return the location of the value at ``path``, or None."""
         location: Location | None = self
         for step in path:
             if location is None:
@@ -465,7 +465,7 @@ class Location:
         return location
 
     def nearest(self, path: Path) -> Location:
-        """Return the place at ``path`` below, or of the nearest thing around it."""
+        """Return the location at ``path``, or of the nearest enclosing value."""
         location = self
         for step in path:
             below = location.inside.get(step)
@@ -475,7 +475,7 @@ class Location:
         return location
 
     def nearest_key(self, path: Path) -> Location | None:
-        """Return the place of the last key on the way to ``path`` that there is, or None."""
+        """Return the location of the last key on ``path`` that exists, or None."""
         location = self
         key: Location | None = None
         for step in path:
@@ -487,7 +487,7 @@ class Location:
         return key
 
     def walk(self, path: Path = ()) -> Iterator[tuple[Path, Location]]:
-        """Yield every value's path and place, this one's first."""
+        """Yield the path and location of every value, this one first."""
         yield path, self
         for step, location in self.inside.items():
             yield from location.walk((*path, step))

@@ -1,7 +1,6 @@
-"""Parameter files of ROS: parameters by node, each value as it was written.
+"""Parameter files of ROS: parameters by node, with each value as its original text.
 
-rcl reads these files by rules of its own (``on`` is true, 012 is ten), so values stay the words
-that they were.
+rcl has its own rules for values (``on`` is true, 012 is ten), so values are kept as text.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ PARAMETERS = "ros__parameters"
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A scalar of the file, with its span."""
+    """A scalar of the file with its span."""
 
     text: str
     #: Whether it has no quotes.
@@ -34,9 +33,9 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class NodeParams:
-    """The parameters in a file for the nodes that a name matches."""
+    """Parameters in a file for the nodes that match a name."""
 
-    #: A name, or a pattern with * for one part and ** for any.
+    #: A name, or a pattern with * for a part of a name and ** for any number of parts.
     name: str
     span: Span
     params: dict[str, Any]
@@ -44,17 +43,17 @@ class NodeParams:
 
 @dataclass(slots=True)
 class ParamsFile:
-    """A parameter file: its nodes in the order of the file, and what is wrong with it."""
+    """A parameter file: its nodes in order, and findings about the file."""
 
     nodes: list[NodeParams] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
 
 
 def load_params(text: str, file: str) -> ParamsFile:
-    """Return what the file says to which nodes.
+    """Return the parameters in the file, by node.
 
     Raises:
-        RejectedError: if it is not YAML, no mapping, or too large.
+        RejectedError: if it is not YAML, not a mapping, or too large.
     """
     refuse_unreadable(text, file)
     try:
@@ -83,12 +82,10 @@ def load_params(text: str, file: str) -> ParamsFile:
 
 
 def _refuse_deep(text: str, file: str) -> None:
-    """Do nothing for a text that is nested as deep as a file may be.
-
-    PyYAML's composer recurses in C without bounds.
+    """Reject a text that is nested too deep, because PyYAML's composer recurses in C.
 
     Raises:
-        RejectedError: if it is nested deeper.
+        RejectedError: if it is nested too deep.
         yaml.YAMLError: if it is not YAML.
     """
     depth = 0
@@ -110,12 +107,12 @@ class _ParamsReader:
         self.file = file
         self.result = ParamsFile()
         self.count = 0
-        self._open: set[int] = set()  # what is being read: an alias of one of these has no end
+        self._open: set[int] = set()  # nodes being read: an alias of one of these would never end
 
     def nodes(self, mapping: yaml.MappingNode, above: str) -> None:
-        """Take the nodes of a mapping.
+        """Read the nodes of a mapping.
 
-        A mapping that has no parameters holds the nodes of a namespace.
+        A mapping without parameters contains the nodes of a namespace.
         """
         with self._reading(mapping):
             self._nodes(mapping, above)

@@ -1,6 +1,6 @@
-"""YAML 1.2's core schema for scalars: ``1e-3`` is a number, ``on`` is a text, ``1:30`` is not 90.
+"""Scalars by YAML 1.2's core schema: ``1e-3`` is a number, ``on`` is text, ``1:30`` is not 90.
 
-PyYAML reads YAML 1.1; only its parser is used here, with the patterns of the YAML 1.2.2
+PyYAML implements YAML 1.1. Only its parser is used here, with the patterns of the YAML 1.2.2
 specification, section 10.3.2.
 """
 
@@ -15,7 +15,7 @@ NULL, BOOL, INT, FLOAT, STR, MAP, SEQ = (
     TAG + kind for kind in ("null", "bool", "int", "float", "str", "map", "seq")
 )
 
-#: Tag, pattern and possible first characters, in the order in which they are tried.
+#: Tag, pattern and possible first characters, in the order in which to try them.
 IMPLICIT = (
     (NULL, re.compile(r"(?:null|Null|NULL|~|)\Z"), "nN~"),
     (BOOL, re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z"), "tTfF"),
@@ -30,7 +30,7 @@ IMPLICIT = (
     ),
 )
 
-#: How YAML writes what is no finite number, in lower case.
+#: Numbers that are not finite, by their notation in YAML in lower case.
 NOT_FINITE = {text: float(text.replace(".", "")) for text in (".inf", "+.inf", "-.inf", ".nan")}
 _PATTERNS = {tag: pattern for tag, pattern, _ in IMPLICIT}
 _FIRST = "nN~tTfF-+.0123456789"
@@ -38,7 +38,7 @@ _FIRST = "nN~tTfF-+.0123456789"
 SCALAR_TAGS = frozenset((STR, *(tag for tag, _, _ in IMPLICIT)))
 
 _MOST_DIGITS = 300
-#: Of a number that is not taken so many characters are shown.
+#: Maximum number of characters of a rejected number in a finding.
 _MOST_SHOWN = 40
 
 
@@ -57,7 +57,7 @@ def plain(text: str) -> str | bool | int | float | None:
     """Return the value of a plain scalar.
 
     Raises:
-        OverflowError: if it is no finite number.
+        OverflowError: if it is not a finite number.
     """
     return scalar(implicit_tag(text), text) if text[:1] in _FIRST else text
 
@@ -66,8 +66,7 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
     """Return the value of a scalar with one of the core tags.
 
     Raises:
-        ValueError: if the text is not of its tag's form (possible with a written tag), or no
-            finite number.
+        ValueError: if the text does not match its explicit tag, or is not a finite number.
     """
     if tag == STR:
         return text
@@ -82,7 +81,7 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
 
 def _number(tag: str, text: str) -> int | float:
     if tag == INT and text[:2] in {"0o", "0x"}:
-        number = int(text, 0)  # Python bounds the digits of decimal numbers only
+        number = int(text, 0)  # Python limits only the digits of decimal numbers
         return number if len(text) < _MOST_DIGITS else _finite(_to_float(number), text)
     if tag == INT and len(text) < _MOST_DIGITS:
         return int(text)
@@ -91,7 +90,7 @@ def _number(tag: str, text: str) -> int | float:
 
 
 def _to_float(number: int) -> float:
-    """Return the number as a float, infinity where no float is that large."""
+    """Return the number as a float, infinity if it is too large."""
     try:
         return float(number)
     except OverflowError:
@@ -100,8 +99,8 @@ def _to_float(number: int) -> float:
 
 def _finite(value: float, text: str) -> float:
     if not math.isfinite(value):
-        shown = (
+        quoted = (
             text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}… ({len(text)} characters)"
         )
-        raise OverflowError(f"{shown} is not a finite number")
+        raise OverflowError(f"{quoted} is not a finite number")
     return value

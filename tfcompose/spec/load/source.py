@@ -1,9 +1,9 @@
-"""A file's data with the place of every key and value, and tfcompose's comments.
+"""A file's data with the span of every key and value, and the comments for tfcompose.
 
-Those are ``# tfcompose: allow TF401 because …``, in XML ``<!-- tfcompose: allow … -->``. A comment
-counts for its own line, or, alone on a line, for the next one. In XML that is the whole tag that
-begins or ends on the line, whatever the number of its lines, or, alone on a line, the next tag
-that opens.
+A comment is ``# tfcompose: allow TF401 because …``, or ``<!-- tfcompose: allow … -->`` in XML. It
+applies to its own line. A comment alone on a line applies to the next line. In XML, a comment
+applies to the complete tag that begins or ends on its line. Alone on a line, it applies to the
+next opening tag.
 """
 
 from __future__ import annotations
@@ -26,75 +26,79 @@ MOST_CHARACTERS = 4_000_000
 
 @dataclass(frozen=True, slots=True)
 class Spans:
-    """Spans of a file: where each key and value is, and the findings so far.
+    """Spans of a file's keys and values, and the findings so far.
 
-    Spans take no part in equality.
+    Spans are ignored in comparisons.
     """
 
     file: str = field(compare=False)
     places: Location = field(compare=False)
     findings: tuple[Finding, ...] = field(default=(), compare=False, kw_only=True)
     allows: tuple[Allow, ...] = field(default=(), compare=False, kw_only=True)
-    #: Spans of values that were overwritten, by path, the last one first.
+    #: Spans of replaced values by path, the last replaced value first.
     replaced: dict[Path, tuple[Span, ...]] = field(
         default_factory=dict, compare=False, kw_only=True
     )
     #: Whether profiles or overlays are merged over the file.
     is_variant: bool = field(default=False, compare=False, kw_only=True)
-    #: The names of the merged profiles, in order.
+    #: Names of the merged profiles, in order.
     profiles: tuple[str, ...] = field(default=(), compare=False, kw_only=True)
+    #: Files of the merged overlays, and settings as ``--set PATH=VALUE``, in order.
+    overlays: tuple[str, ...] = field(default=(), compare=False, kw_only=True)
 
     def span_of(self, path: Path) -> Span:
-        """Return the value's place, or that of the nearest mapping or list around it."""
+        """Return the span of the value at a path, or of the nearest enclosing mapping or list."""
         return self.places.nearest(path).span
 
     def key_span(self, path: Path) -> Span:
-        """Return the place of the key, or of the nearest key around it."""
+        """Return the span of the key at a path, or of the nearest enclosing key."""
         key = self.places.nearest_key(path)
         return key.span if key else Span(self.file)
 
     def exact_span(self, path: Path) -> Span | None:
-        """Return the place of the value, or None if there is none at the path."""
+        """Return the span of the value at a path, None without a value."""
         location = self.places.get(path)
         return location.span if location else None
 
     def has_key(self, path: Path) -> bool:
-        """Return whether the last step of the path is a key that stands somewhere."""
+        """Return whether the last step of the path is a key in the file."""
         around = self.places.get(path[:-1])
         return bool(path) and around is not None and path[-1] in around.keys
 
     def has(self, path: Path) -> bool:
-        """Return whether there is a value at the path."""
+        """Return whether a value exists at the path."""
         return self.places.get(path) is not None
 
 
 @dataclass(frozen=True, slots=True)
 class Source(Spans):
-    """A file's plain data, with its spans: the input of validation."""
+    """A file's plain data with spans: the input of validation."""
 
-    #: Aliases of one anchor are one object, which nothing changes.
+    #: The data. Aliases of an anchor are the same object. The data are never modified.
     data: dict[str, Any]
     #: Whether values may be null.
     has_nulls: bool = field(default=True, compare=False, kw_only=True)
 
     def mapping(self, *path: str | int) -> dict[str, Any]:
-        """Return the mapping at a path as it is written, empty where there is none."""
+        """Return the mapping at a path, empty without one."""
         data: Any = self.data
         for step in path:
             data = data.get(step) if isinstance(data, dict) else None
         return data if isinstance(data, dict) else {}
 
     def part(self, path: Path) -> Source:
-        """Return the mapping at ``path`` as a source of its own, without what was found."""
+        """Return the mapping at ``path`` as a separate source without findings."""
         return Source(self.file, self.places.nearest(path), self.mapping(*path))
 
 
-def load(text: str, file: str) -> Source:
-    """Return the mapping that the YAML text holds.
+def load(text: str, file: str, expected: str = "a robot begins with: tfcompose: 1") -> Source:
+    """Return the mapping in the YAML text.
+
+    ``expected`` is the help for a text that holds none.
 
     Raises:
-        RejectedError: if the text is not YAML, not one document, not a mapping, or too large to be
-            a robot.
+        RejectedError: if the text is not YAML, not a single document, not a mapping, or too
+            large for a robot.
     """
     refuse_unreadable(text, file)
     if (begin := text.lstrip("\ufeff \t\r\n")).startswith("<") and not begin.startswith("<<"):
@@ -111,9 +115,7 @@ def load(text: str, file: str) -> Source:
             else "empty"
         )
         message = f"the file is {what}, not a mapping of keys and values"
-        raise RejectedError(
-            [finding("TF002", message, location.span, help="a robot begins with: tfcompose: 1")]
-        )
+        raise RejectedError([finding("TF002", message, location.span, help=expected)])
     if "spec_digest" in data and "tfcompose" not in data:
         advice = (
             "name the robot file that it was built from; up, verify, doctor and export take a"
@@ -133,10 +135,10 @@ def load(text: str, file: str) -> Source:
 
 
 def refuse_unreadable(text: str, file: str, most_characters: int = MOST_CHARACTERS) -> None:
-    """Do nothing for a text that can be a file of this language.
+    """Reject a file that is too large or is not text.
 
     Raises:
-        RejectedError: if it is too large, or no text.
+        RejectedError: if it is too large or is not text.
     """
     if len(text) > most_characters:
         message = f"the file has {len(text):,} characters; a robot has at most {most_characters:,}"
@@ -156,13 +158,13 @@ def refuse_unreadable(text: str, file: str, most_characters: int = MOST_CHARACTE
 
 
 def find_path(named: str, span: Span) -> str:
-    """Return the path of a file that is named at a place.
+    """Return the path of a file that is named at a span.
 
-    Relative to the file there, or to the working folder.
+    A relative path starts at the folder of the span's file, or at the working directory.
     """
     folder = (
         "" if span.file.startswith("--") else posixpath.dirname(span.file)
-    )  # --set and its like
+    )  # --set and similar
     return posixpath.normpath(posixpath.join(folder, named))
 
 
@@ -172,7 +174,7 @@ _COMMENT = re.compile(
 _XML = re.compile(
     r"\s*tfcompose:\s*allow\b(?P<codes>[\sA-Z0-9,]*?)(?:\bbecause\b(?P<reason>.*))?\s*", re.DOTALL
 )
-#: What begins with ``<``, as one piece; tags that open, and comments, are distinguished.
+#: Markup that begins with ``<``; opening tags and comments are distinguished.
 _MARKUP = re.compile(
     r"<!--(?P<comment>.*?)-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>"
     r"|(?P<tag><[^\s<>\"'/!?](?:[^<>\"']|\"[^\"]*\"|'[^']*')*>)|<",
@@ -182,26 +184,26 @@ _CODE = re.compile(r"[A-Z]+[0-9]+")
 
 
 def allows_in(text: str, file: str) -> tuple[Allow, ...]:
-    """Return the comments in a file's text."""
-    found = []
+    """Return the comments for tfcompose in a file's text."""
+    allows = []
     for number, line in enumerate(text.splitlines(), 1):
         match = _COMMENT.search(line) if "tfcompose:" in line else None
         if match:
             alone = not line[: match.start()].strip()
             span = Span(file, number, match.start() + 1, number, len(line) + 1)
             codes = tuple(_CODE.findall(match["codes"]))
-            found.append(Allow(codes, number + alone, (match["reason"] or "").strip(), span))
-    return tuple(found)
+            allows.append(Allow(codes, number + alone, (match["reason"] or "").strip(), span))
+    return tuple(allows)
 
 
 def allows_in_xml(text: str, file: str) -> tuple[Allow, ...]:
-    """Return the comments in an XML file's text."""
+    """Return the comments for tfcompose in an XML file's text."""
     if "tfcompose:" not in text:
         return ()
     starts = [0, *(match.end() for match in re.finditer("\r\n|\r|\n", text))]
-    found: list[Allow] = []
-    waiting: list[int] = []  # comments that stand alone, and wait for the tag that they are about
-    tag = (0, 0)  # the first and the last line of the last tag that opened
+    allows: list[Allow] = []
+    waiting: list[int] = []  # comments alone on a line, which apply to the next tag
+    tag = (0, 0)  # first and last line of the last opening tag
     for markup in _MARKUP.finditer(text):
         if markup["comment"] is None:
             if markup["tag"]:
@@ -210,7 +212,7 @@ def allows_in_xml(text: str, file: str) -> tuple[Allow, ...]:
                     bisect_right(starts, markup.end() - 1),
                 )
                 for index in waiting:
-                    found[index] = replace(found[index], line=tag[0], last=tag[1])
+                    allows[index] = replace(allows[index], line=tag[0], last=tag[1])
             waiting.clear()
             continue
         match = _XML.fullmatch(markup["comment"])
@@ -219,13 +221,13 @@ def allows_in_xml(text: str, file: str) -> tuple[Allow, ...]:
         span = _span(file, starts, markup.start(), markup.end())
         alone = not text[starts[span.line - 1] : markup.start()].strip()
         if alone:
-            waiting.append(len(found))
+            waiting.append(len(allows))
         first, last = (
             (span.end_line + 1, 0) if alone else tag if tag[1] == span.line else (span.line, 0)
         )
         reason = " ".join((match["reason"] or "").split())
-        found.append(Allow(tuple(_CODE.findall(match["codes"])), first, reason, span, last))
-    return tuple(found)
+        allows.append(Allow(tuple(_CODE.findall(match["codes"])), first, reason, span, last))
+    return tuple(allows)
 
 
 def _span(file: str, starts: list[int], begin: int, end: int) -> Span:

@@ -1,8 +1,8 @@
-"""Text that is not YAML: where the fault stands, and what to write instead.
+"""Text that is not YAML: the place of the fault, and what to write instead.
 
-The parser points at the place where it cannot go on, which is often a line below the fault, and
-says what it expected in the grammar's words. Each diagnosis knows one slip of the pen by its place
-and the lines around it.
+The parser points at the place where it stops, which is often a line below the fault, and reports
+what its grammar expected. Each diagnosis recognises a typing error by its place and the
+surrounding lines.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Finding:
-    """Return the finding for a character that must not stand in YAML."""
+    """Return the finding for a character that is forbidden in YAML."""
     hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
     position = hit.start() if hit else error.position
     line, column = text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
@@ -31,10 +31,9 @@ def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Findin
 
 
 def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> list[Finding]:
-    """Return the finding for text that the parser refuses, with where it began.
+    """Return the findings for text that the parser rejects, with the place where the fault began.
 
-    Where an expression lacks its quotes, each other one in the text that does has a finding too:
-    the parser stops at the first.
+    If expressions lack quotes, there is a finding for each, because the parser stops at the first.
     """
     mark, began = error.problem_mark or error.context_mark, error.context_mark
     lines = text.splitlines()
@@ -47,10 +46,12 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> list[Finding
     )
     if "parsing a flow" in message and "${" in fault.stopped:
         bare = list(bare_expressions(text, file))
-        if any(span.span and span.span.line == fault.at[0] + 1 for span in bare):
+        if any(span.span and span.span.line == fault.position[0] + 1 for span in bare):
             return bare
-    diagnosis = next((found for known in _DIAGNOSES if (found := known(fault))), None)
-    line, column = diagnosis.at if diagnosis else fault.at
+    diagnosis = next(
+        (explained for diagnose in _DIAGNOSES if (explained := diagnose(fault))), None
+    )
+    line, column = diagnosis.position if diagnosis else fault.position
     span = Span(file, line + 1, column + 1, line + 1, column + 2)
     notes = []
     if fault.began and fault.began[0] != line and (diagnosis is None or diagnosis.has_beginning):
@@ -62,7 +63,7 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> list[Finding
 
 
 def no_yaml(text: str, file: str) -> Finding:
-    """Return the finding for XML where YAML is expected: most often a URDF as a robot file."""
+    """Return the finding for XML where YAML is expected, which is usually a URDF."""
     is_xacro = "ros.org/wiki/xacro" in text
     key = "xacro" if is_xacro else "urdf"
     advice = (
@@ -77,8 +78,8 @@ def no_yaml(text: str, file: str) -> Finding:
     )
 
 
-#: What may stand in a line of YAML, as far as brackets and expressions go: a comment, a text in
-#: quotes, a bracket, the end of a value, a value without quotes that holds an expression, another.
+#: Tokens of a line of YAML that matter for brackets and expressions: a comment, a quoted text, a
+#: bracket, the end of a value, an unquoted value with an expression, any other value.
 _TOKENS = re.compile(
     r"""
     (?P<comment> (?:(?<=\s)|^)\#.* )
@@ -93,14 +94,14 @@ _TOKENS = re.compile(
     """,
     re.MULTILINE | re.VERBOSE,
 )
-#: What is arithmetic around an expression, with the expressions taken out.
+#: Arithmetic around expressions, with the expressions taken out.
 _ARITHMETIC = re.compile(r"[-+*/().\d\s]*")
 
 
 def bare_expressions(text: str, file: str) -> Iterator[Finding]:
-    """Find expressions inside [ ] or { } that lack their quotes.
+    """Yield findings about expressions inside [ ] or { } that lack quotes.
 
-    The edit puts the whole value into one pair of quotes, and arithmetic into the braces.
+    The edit puts the complete value into quotes, and moves arithmetic into the braces.
     """
     depth, line, begin = 0, 1, 0
     for token in _TOKENS.finditer(text):
@@ -126,7 +127,7 @@ def bare_expressions(text: str, file: str) -> Iterator[Finding]:
 
 
 def _in_braces(value: str) -> str:
-    """Return a value whose arithmetic is inside of the braces of its expression."""
+    """Return a value with its arithmetic moved into the braces of its expression."""
     rest = _EXPRESSION.sub("", value)
     if not rest or not _ARITHMETIC.fullmatch(rest):
         return value
@@ -135,17 +136,17 @@ def _in_braces(value: str) -> str:
 
 
 def _operand(expression: str) -> str:
-    """Return an expression as an operand of a product: a sum needs brackets."""
+    """Return an expression as an operand of a product. A sum gets brackets."""
     is_sum = re.search(r"[^\s*/(+-]\s*[-+]", expression)
     return f"({expression})" if is_sum else expression
 
 
 @dataclass(frozen=True, slots=True)
 class _Fault:
-    """The parser's message: line and column of its stop and of what it was reading."""
+    """The parser's message, with the places where it stopped and where its current item began."""
 
     lines: list[str]
-    at: tuple[int, int]
+    position: tuple[int, int]
     began: tuple[int, int] | None
     message: str
 
@@ -155,11 +156,11 @@ class _Fault:
     @property
     def stopped(self) -> str:
         """The line where the parser stopped."""
-        return self.line(self.at[0])
+        return self.line(self.position[0])
 
     def above(self) -> int:
-        """Return the number of the nearest line above with anything but a comment, or -1."""
-        number = self.at[0] - 1
+        """Return the number of the nearest previous line that is not blank or a comment, or -1."""
+        number = self.position[0] - 1
         while number >= 0 and not self.lines[number].split("#")[0].strip():
             number -= 1
         return number
@@ -167,20 +168,20 @@ class _Fault:
 
 @dataclass(frozen=True, slots=True)
 class _Diagnosis:
-    at: tuple[int, int]
+    position: tuple[int, int]
     message: str
     help: str
     has_beginning: bool = False
 
 
-#: Key and value in a line, as they should be; with a key in quotes too.
+#: A correct line with key and value; the key may be quoted.
 _PAIR = re.compile(r"""\s*(?:- )?(?:[\w/.${}-]+|"[^"]*"|'[^']*'):\s+[^\s#]""")
 _LONE_WORD = re.compile(r"( *)([\w/.-]+)\s*(?:#.*)?")
 _WORDS = re.compile(r"( *)(?:- )?([\w/.-]+)\s+([^\s:#][^:]*)")
 _GLUED_PAIR = re.compile(r"( *)(?:- )?([A-Za-z_]\w*):([^\s/].*)")
 _EXPRESSION = re.compile(r"\$\{[^{}\"']*\}")
 _CLOSING = {"{": "}", "[": "]"}
-#: Texts in quotes, comments and expressions, in which brackets are none; and brackets.
+#: Quoted texts, comments and expressions, whose brackets do not count; and brackets.
 _TOKEN = re.compile(r"""\"(?:[^"\\]|\\.)*\"|'[^']*'|(?<![^\s])#[^\n]*|\$\{[^{}\n]*\}|[][{}]""")
 
 
@@ -192,12 +193,14 @@ def _tab(fault: _Fault) -> _Diagnosis | None:
     if "\t" not in fault.stopped[: _indent(fault.stopped)]:
         return None
     return _Diagnosis(
-        fault.at, "a tab in the indentation", "indent with spaces; YAML does not allow tabs there"
+        fault.position,
+        "a tab in the indentation",
+        "indent with spaces; YAML does not allow tabs there",
     )
 
 
 def _key_without_colon(fault: _Fault) -> _Diagnosis | None:
-    """A key that the parser still waits for the colon of."""
+    """A key without a colon."""
     if (
         not fault.began
         or "expected ':'" not in fault.message
@@ -207,22 +210,24 @@ def _key_without_colon(fault: _Fault) -> _Diagnosis | None:
     return _no_colon(fault.lines[fault.began[0]], fault.began)
 
 
-def _no_colon(line: str, at: tuple[int, int]) -> _Diagnosis:
+def _no_colon(line: str, position: tuple[int, int]) -> _Diagnosis:
     """Return the diagnosis of a line without a colon: a key alone, or a key and its value."""
     pair = _WORDS.fullmatch(line)
     if pair:
-        return _Diagnosis(at, f"{pair[2]} has no colon", f"write {pair[2]}: {pair[3].strip()}")
+        return _Diagnosis(
+            position, f"{pair[2]} has no colon", f"write {pair[2]}: {pair[3].strip()}"
+        )
     text = line.split(" #", maxsplit=1)[0].strip()
-    return _Diagnosis(at, f"{text} has no colon", f"write {text}:")
+    return _Diagnosis(position, f"{text} has no colon", f"write {text}:")
 
 
 def _is_late(fault: _Fault) -> bool:
-    """Return whether the parser took the line above for a value that goes on here."""
+    """Return whether the parser read the line above as a value that continues here."""
     return "mapping values are not allowed" in fault.message or "parsing a block" in fault.message
 
 
 def _word_above(fault: _Fault) -> _Diagnosis | None:
-    """A lone word above a line that is indented more."""
+    """A single word above a line that is indented further."""
     above = fault.above()
     match = _LONE_WORD.fullmatch(fault.line(above)) if _is_late(fault) and above >= 0 else None
     if not match or not fault.stopped or len(match[1]) >= _indent(fault.stopped):
@@ -231,12 +236,12 @@ def _word_above(fault: _Fault) -> _Diagnosis | None:
 
 
 def _pair_above(fault: _Fault) -> _Diagnosis | None:
-    """A key and a value above without a colon, or without a space behind it."""
+    """A key and a value in the line above without a colon, or without a space after it."""
     if "mapping values are not allowed" not in fault.message:
         return None
     above = fault.above()
     while above > 0 and fault.line(above - 1).strip() and _WORDS.fullmatch(fault.line(above - 1)):
-        above -= 1  # the first of several lines in a row
+        above -= 1  # the first of several such lines
     line = fault.line(above)
     glued = _GLUED_PAIR.fullmatch(line)
     if glued:
@@ -247,8 +252,8 @@ def _pair_above(fault: _Fault) -> _Diagnosis | None:
 
 
 def _two_in_a_line(fault: _Fault) -> _Diagnosis | None:
-    """Two keys in one line: ``frames: mast: {}``."""
-    line, column = fault.stopped, fault.at[1]
+    """Two keys on a line: ``frames: mast: {}``."""
+    line, column = fault.stopped, fault.position[1]
     if "mapping values are not allowed" not in fault.message or not (
         pair := _PAIR.match(line[:column])
     ):
@@ -257,17 +262,17 @@ def _two_in_a_line(fault: _Fault) -> _Diagnosis | None:
     key = inner.strip()
     if " " in key:
         advice = f"put the value in quotes, if {key}: belongs to it"
-        return _Diagnosis(fault.at, "a second colon in the value", advice)
+        return _Diagnosis(fault.position, "a second colon in the value", advice)
     advice = f"{key}: belongs in the next line, indented more than {outer.strip()}"
     return _Diagnosis(
-        (fault.at[0], pair.end() - 1),
+        (fault.position[0], pair.end() - 1),
         f"{key} is a key in the line of another, {outer.strip()}",
         advice,
     )
 
 
 def _below_a_value(fault: _Fault) -> _Diagnosis | None:
-    """A line that is indented more than the key and value above it."""
+    """A line that is indented further than the key and value above it."""
     above, indent = fault.above(), _indent(fault.stopped)
     if "mapping values are not allowed" not in fault.message or above < 0:
         return None
@@ -279,49 +284,53 @@ def _below_a_value(fault: _Fault) -> _Diagnosis | None:
         f" {left}"
     )
     return _Diagnosis(
-        (fault.at[0], indent), message, f"begin it in column {left + 1}, as line {above + 1} does"
+        (fault.position[0], indent),
+        message,
+        f"begin it in column {left + 1}, as line {above + 1} does",
     )
 
 
 def _between_levels(fault: _Fault) -> _Diagnosis | None:
-    """A line that is indented neither as the mapping that it belongs to nor more."""
+    """A line whose indentation matches no level."""
     if (
         not fault.began
         or "parsing a block" not in fault.message
-        or _indent(fault.stopped) != fault.at[1]
+        or _indent(fault.stopped) != fault.position[1]
     ):
         return None
     line, left = fault.began
-    if fault.at[1] == left:
+    if fault.position[1] == left:
         return None
-    message = f"indented by {plural(fault.at[1], 'space')}, and what it belongs to by {left}"
+    message = f"indented by {plural(fault.position[1], 'space')}, and what it belongs to by {left}"
     advice = f"begin it in column {left + 1}, as line {line + 1} does"
-    return _Diagnosis(fault.at, message, advice, has_beginning=True)
+    return _Diagnosis(fault.position, message, advice, has_beginning=True)
 
 
 def _comment(fault: _Fault) -> _Diagnosis | None:
-    """A comment as in C."""
-    rest = fault.stopped[fault.at[1] :]
+    """A comment in the style of C."""
+    rest = fault.stopped[fault.position[1] :]
     if not rest.startswith(("//", "/*")):
         return None
     return _Diagnosis(
-        fault.at, f"a comment begins with #, not {rest[:2]}", f"write # {rest[2:].strip(' */')}"
+        fault.position,
+        f"a comment begins with #, not {rest[:2]}",
+        f"write # {rest[2:].strip(' */')}",
     )
 
 
 def _open_bracket(fault: _Fault) -> _Diagnosis | None:
-    """A bracket that is closed nowhere, or by one of the other kind."""
+    """A bracket that is not closed, or is closed by a bracket of the other kind."""
     if not fault.began or "parsing a flow" not in fault.message:
         return None
     line, column = fault.began
     bracket = fault.line(line)[column : column + 1]
     if bracket not in _CLOSING:
         return None
-    closes = fault.stopped[fault.at[1] : fault.at[1] + 1]
+    closes = fault.stopped[fault.position[1] : fault.position[1] + 1]
     if closes in _CLOSING.values() and closes != _CLOSING[bracket]:
         message = f"{bracket} is closed by {closes}"
         return _Diagnosis(
-            fault.at, message, f"write {_CLOSING[bracket]} before it", has_beginning=True
+            fault.position, message, f"write {_CLOSING[bracket]} before it", has_beginning=True
         )
     if not _is_left_open(fault.lines[line:], column):
         return None
@@ -340,7 +349,7 @@ def _open_quote(fault: _Fault) -> _Diagnosis | None:
 
 
 def _is_left_open(lines: list[str], column: int) -> bool:
-    """Return whether there is a bracket at a column of the first line that is closed nowhere."""
+    """Return whether the bracket at a column of the first line is never closed."""
     depth = 0
     for token in _TOKEN.finditer("\n".join([lines[0][column:], *lines[1:]])):
         depth += (token[0] in _CLOSING) - (token[0] in _CLOSING.values())
@@ -349,7 +358,7 @@ def _is_left_open(lines: list[str], column: int) -> bool:
     return True
 
 
-#: In the order in which they are tried: the first that knows the fault names it.
+#: Diagnoses in the order in which to try them. The first match is used.
 _DIAGNOSES: tuple[Callable[[_Fault], _Diagnosis | None], ...] = (
     _tab,
     _key_without_colon,

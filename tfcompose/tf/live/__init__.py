@@ -1,5 +1,5 @@
-"""Observation of the live tree, shared by guard, monitor, doctor, verify, tree, graph and echo.
+"""Observation of the live tree, for guard, monitor, doctor, verify, tree, graph and echo.
 
-``topics`` receives messages, ``publishers`` tracks publishers, ``edges`` and ``arrivals`` track
-edges; ``listener`` feeds observers, and ``snapshot`` fills a ``TreeState``.
+``topics`` receives messages, and ``publishers`` tracks publishers. ``edges`` and ``arrivals``
+track edges. ``ros_feed`` feeds observers, and ``snapshot`` fills a ``TreeState``.
 """

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import sqrt
 
-#: tf2's buffers keep 10 s: a stamp that is farther off cannot be looked up together with the rest.
+#: tf2 buffers keep 10 s. A stamp that is farther off cannot be looked up together with others.
 KEPT_NS = 10_000_000_000
-#: A gap longer than the window and than this many usual gaps is a pause: rates are measured from
-#: its end.
+#: A gap that is longer than the window and than this many usual gaps is a pause. Rates are
+#: measured from the end of a pause.
 PAUSE = 10.0
 
 
@@ -22,7 +22,7 @@ class _Sums:
     begun_ns: int = 0
     gaps: int = 0
     gaps_ns: int = 0
-    squares: float = 0.0  # of gaps in seconds
+    squares: float = 0.0  # of gaps, in s²
     longest_ns: int = 0
     longest_ended_ns: int = 0
     delays: int = 0
@@ -49,7 +49,7 @@ class _Sums:
         self.delays_ns += delay_ns
 
     def plus(self, other: _Sums) -> _Sums:
-        """Return the sums over both."""
+        """Return the combined sums."""
         longest = max(self, other, key=lambda each: (each.longest_ns, each.longest_ended_ns))
         spans = [(each.least_ns, each.most_ns) for each in (self, other) if each.delays]
         return _Sums(
@@ -68,9 +68,9 @@ class _Sums:
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Measured timing; None: too few arrivals."""
+    """Measured timing. A value is None if there are too few arrivals."""
 
-    #: Arrivals per second; it falls while none comes.
+    #: Arrivals per second. It decreases while no message arrives.
     rate: float | None = None
     #: Standard deviation of the time between two arrivals.
     jitter_s: float | None = None
@@ -78,7 +78,7 @@ class Timing:
     longest_gap_s: float | None = None
     #: Time since the end of the longest gap.
     since_gap_s: float | None = None
-    #: Mean of arrival minus stamp; negative: stamped ahead of the receiver's clock.
+    #: Mean of arrival minus stamp, negative if stamps are ahead of the receiver's clock.
     delay_s: float | None = None
     #: Minimum of arrival minus stamp.
     least_delay_s: float | None = None
@@ -94,9 +94,9 @@ class Arrivals:
     the other values.
     """
 
-    #: The window is one to two of these; 0: all arrivals.
+    #: The window covers one to two of these periods; 0 for all arrivals.
     window_ns: int = 0
-    #: Arrivals in this first period only count as a number, because a new subscriber receives
+    #: Arrivals in this initial period are only counted, because a new subscriber receives all
     #: latched messages at once.
     settle_ns: int = 0
     count: int = 0
@@ -107,7 +107,7 @@ class Arrivals:
     _resumed_ns: int = 0
 
     def note_arrival(self, at_ns: int, delay_ns: int | None) -> None:
-        """Note an arrival, and the age of its stamp if known."""
+        """Record an arrival, and the age of its stamp if known."""
         self.count += 1
         if self.count == 1:
             self._now.begun_ns = at_ns
@@ -136,7 +136,7 @@ class Arrivals:
         return gap_ns > self.window_ns and is_unusual
 
     def note_resumption(self, at_ns: int) -> None:
-        """Note an arrival after a pause that does not count as a gap."""
+        """Record an arrival after a pause that does not count as a gap."""
         if self.count:
             self.count += 1
             self.last_ns = at_ns
@@ -172,7 +172,7 @@ class Arrivals:
         )
 
     def steady_rate(self, least_ns: int) -> float | None:
-        """Return the rate in hertz without the longest gap, which may be a hiccup.
+        """Return the rate in Hz without the longest gap, which may be an exception.
 
         None while the gaps add up to less than ``least_ns``.
         """

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """Age of an edge's newest stamp just before the next one arrives, in seconds.
+    """Age of an edge's newest stamp just before the next message arrives, in seconds.
 
-    As mean and maximum.
+    It is given as mean and maximum.
     """
 
     edge: EdgeState
@@ -30,20 +30,23 @@ class FrameChain:
     """The frames from A to B, and their edges."""
 
     frames: tuple[str, ...]
-    #: The edge that counts for each frame, in the order of the frames: the newest.
+    #: For each frame, the edge with the newest message, in the order of the frames.
     newest: tuple[EdgeState, ...]
-    #: All publishers' edges, in the order of the frames.
+    #: The edges of all publishers, in the order of the frames.
     all_edges: tuple[EdgeState, ...]
 
     @property
     def delay(self) -> Delay | None:
-        """The delay of the edge that lags most, and so of the pose; None if no edge moves."""
+        """The delay of the edge that lags most, which determines the pose.
+
+        None if no edge moves.
+        """
         delays = [delay for edge in self.newest if (delay := _delay(edge))]
         return max(delays, key=lambda delay: delay.mean_s, default=None)
 
 
 def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | str:
-    """Return the chain between two frames, or why there is none.
+    """Return the chain between two frames, or the reason why there is none.
 
     If a frame has several publishers, the newest message counts, as in tf2, unless tf2 rejects it.
     """
@@ -54,10 +57,10 @@ def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | st
         by_child.setdefault(edge.child, []).append(edge)
     for rivals in by_child.values():
         rivals.sort(key=lambda edge: (edge.present is False, -edge.stream.arrivals.last_ns))
-    known = {*by_child, *(edge.parent for rivals in by_child.values() for edge in rivals)}
-    unknown = next((frame for frame in (a, b) if frame not in known), None)
+    frames = {*by_child, *(edge.parent for rivals in by_child.values() for edge in rivals)}
+    unknown = next((frame for frame in (a, b) if frame not in frames), None)
     if unknown is not None:
-        return str(UnknownFrame(unknown, sorted(known)))
+        return str(UnknownFrame(unknown, sorted(frames)))
     above_a, above_b = _above(by_child, a), _above(by_child, b)
     common = next((frame for frame in above_a if frame in above_b), None)
     if common is None:
@@ -71,11 +74,11 @@ def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | st
 
 
 def _above(by_child: dict[str, list[EdgeState]], frame: str) -> list[str]:
-    """Return the frame and its ancestors up to the root, or all frames of a loop once."""
-    found = [frame]
-    while frame in by_child and (frame := by_child[frame][0].parent) not in found:
-        found.append(frame)
-    return found
+    """Return the frame and its ancestors up to the root. Frames of a loop occur once."""
+    frames = [frame]
+    while frame in by_child and (frame := by_child[frame][0].parent) not in frames:
+        frames.append(frame)
+    return frames
 
 
 def _delay(edge: EdgeState) -> Delay | None:

@@ -1,4 +1,4 @@
-"""Live pose of one frame in another."""
+"""Live poses of a frame in another frame."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ TOO_EARLY = (
 def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
     """Pass poses of the live tree to ``on_pose`` as they arrive.
 
-    A pose with the time of the last one is not new, and skipped. Return None after one pose with
-    ``once``, or when ``stop`` is requested; else the reason why no new pose came within the
+    A pose with the time of the previous pose is skipped. Return None after a pose with ``once``,
+    or when ``stop`` is requested. Otherwise, return the reason why no new pose arrived within the
     timeout.
     """
     listened = _Listened(query)
@@ -42,9 +42,7 @@ def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
         given_ns: int | None = None
         while not stop.requested:
             wait(node, data.readers, 0.05, stop)
-            clock_ns = (
-                clock.now_ns()
-            )  # before what is taken, so that nothing of a time before the jump comes after it
+            clock_ns = clock.now_ns()  # first, so that no pose from before a clock jump follows it
             for each in data.take():
                 read = partial(listened.take, decoder, each)
                 reading.read(each.received, read, listened.bounds.floods, time.monotonic())
@@ -76,7 +74,7 @@ def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
 
 
 class _Listened:
-    """Received messages, and why they have no pose."""
+    """Received messages, and the reasons for missing poses."""
 
     def __init__(self, query: PoseQuery) -> None:
         self.buffer = Buffer()
@@ -117,6 +115,6 @@ class _Listened:
                 f"; what came for {child} was too old to be taken: did a bag or a simulation start"
                 " again?"
             )
-        elif child not in self.buffer.frames:  # nothing that came at other times was taken
+        elif child not in self.buffer.frames:  # none of its transforms was accepted
             reason += f"; what came for {child or 'a frame without name'} was rejected: {why.text}"
         return NoPose(reason, advice)

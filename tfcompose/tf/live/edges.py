@@ -1,8 +1,9 @@
-"""Observation of edges for monitor, verify, view and doctor: publisher, rate and delay of each.
+"""Observation of edges for monitor, verify, view and doctor.
 
-An observer takes messages from a subscription or a bag, and the endpoints of the graph; it reads
-no clock and no topic. Its memory does not grow with time, and is bounded even if a publisher keeps
-inventing frame names. Times are nanoseconds.
+An observer records the publisher, rate and delay of each edge. It takes messages from a
+subscription or a bag, and the endpoints of the ROS graph. It reads no clock and no topic itself.
+Its memory does not grow with time, and is bounded even if a publisher keeps inventing frame names.
+Times are in nanoseconds.
 """
 
 from __future__ import annotations
@@ -26,12 +27,13 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.tf_codec import Row
 
 
-#: Arrivals within this time after the first one are not counted: a new subscriber gets all latched
-#: messages at once.
+#: Arrivals within this time in seconds after the first arrival are not counted, because a new
+#: subscriber receives all latched messages at once.
 SETTLE_S = 0.3
-#: A frame is handed over if it stays in each parent for at least this many transforms, on average.
+#: A frame changes its parent on purpose if it keeps each parent for at least this many transforms
+#: on average.
 MIN_RUN = 3
-#: A shorter quaternion is no rotation.
+#: A quaternion with a smaller length is not a rotation.
 LEAST_LENGTH = 1e-9
 _SECOND_NS = 1_000_000_000
 
@@ -39,7 +41,7 @@ _SECOND_NS = 1_000_000_000
 def nearer_clock(
     rows: Sequence[Row], received_ns: int, clock_ns: int | None, *, static: bool
 ) -> int | None:
-    """Return the time of /clock if stamps are nearer to it than to ``received_ns``, else None."""
+    """Return the time of /clock if stamps are nearer to it than to ``received_ns``, or None."""
     if clock_ns is None or static or not rows:
         return None
     stamp_ns = rows[0][2] * _SECOND_NS + rows[0][3]
@@ -48,20 +50,20 @@ def nearer_clock(
 
 @dataclass(slots=True)
 class EdgeStream:
-    """One edge from one publisher on one kind of topic.
+    """An edge from a publisher on a kind of topic (moving or fixed).
 
     Frame names are as in tf2, without a leading slash.
     """
 
-    #: The frame in which the pose is given.
+    #: The reference frame of the pose.
     parent: str
-    #: The frame whose pose it is.
+    #: The frame with this pose.
     child: str
-    #: True: received on /tf_static.
+    #: Whether it was received on /tf_static.
     static: bool
-    #: The publisher's id, 16 bytes; None if unknown, as in a bag.
+    #: The publisher's id, 16 bytes, None if unknown, as in a bag.
     gid: bytes | None
-    #: Arrival times: ``arrivals.count`` of all messages, ``arrivals.last_ns`` of the newest.
+    #: Arrivals: ``arrivals.count`` messages, the newest at ``arrivals.last_ns``.
     arrivals: Arrivals
     #: Arrival of the first message, by the receiver's clock.
     first_ns: int
@@ -73,12 +75,12 @@ class EdgeStream:
     stamp_ns: int = -1
     #: The stamp of the first message.
     oldest_ns: int = -1
-    #: Arrival of the newest message minus its stamp; negative: stamped ahead of the receiver's
-    #: clock.
+    #: Arrival of the newest message minus its stamp, negative if the stamp is ahead of the
+    #: receiver's clock.
     delay_ns: int = 0
-    #: Number of stamps before their predecessor.
+    #: Number of stamps that are earlier than the previous stamp.
     stamps_back: int = 0
-    #: Number of stamps equal to their predecessor.
+    #: Number of stamps that are equal to the previous stamp.
     stamps_repeated: int = 0
     #: The reason of tf2's last rejection.
     rejected: Rejection | None = None
@@ -86,10 +88,10 @@ class EdgeStream:
     rejected_row: Row | None = None
     #: Number of transforms that tf2 rejects.
     rejections: int = 0
-    #: True: a name came with a leading slash.
+    #: Whether a name had a leading slash.
     slashed: bool = False
-    #: The edges from the same publisher that give this frame different parents, including this
-    #: one; None: this is the only one.
+    #: The edges, including this edge, with which the publisher gives this frame different parents;
+    #: None if this is its only parent.
     handover: Handover | None = None
     #: Number of times that this edge followed another edge of ``handover``.
     begun: int = 0
@@ -98,8 +100,8 @@ class EdgeStream:
     def is_taken(self) -> bool:
         """Whether tf2 accepts any of its transforms.
 
-        tf2 on Jazzy converts a quaternion to a matrix before it checks the length, and so
-        normalises it. A quaternion of length 0 remains invalid.
+        tf2 on Jazzy converts a quaternion to a matrix before it checks the length, which
+        normalises it. A quaternion of length 0 stays invalid.
         """
         if self.rejections < self.arrivals.count:
             return True
@@ -121,7 +123,7 @@ class EdgeStream:
         return stamped_ns / took_ns if took_ns > 0 and stamped_ns > 0 else 1.0
 
     def take(self, row: Row, received_ns: int, clock_ns: int) -> None:
-        """Add a transform; its stamp is compared with ``clock_ns``."""
+        """Add a transform. Its stamp is compared with ``clock_ns``."""
         stamp_ns = row[2] * _SECOND_NS + row[3]
         self.row = row
         if stamp_ns > self.newest_ns:
@@ -149,7 +151,7 @@ class EdgeStream:
             self._reject()
 
     def _reject(self) -> None:
-        """Count the newest transform as rejected if tf2 rejects it."""
+        """Count the newest transform as rejected if tf2 would reject it."""
         why = rejection_of(self.parent, self.child, self.row[4:])
         if why is not None:
             self.rejected, self.rejected_row, self.rejections = why, self.row, self.rejections + 1
@@ -157,10 +159,10 @@ class EdgeStream:
 
 @dataclass(slots=True)
 class Handover:
-    """The edges with which one publisher gives one frame alternating parents."""
+    """The edges with which a publisher gives a frame alternating parents."""
 
     streams: list[EdgeStream]
-    #: The edge that was received last.
+    #: The edge of the last transform.
     holder: EdgeStream
 
     def join(self, stream: EdgeStream) -> None:
@@ -171,7 +173,7 @@ class Handover:
                 each.handover = self
 
     def take(self, stream: EdgeStream) -> bool:
-        """Add a transform; return whether the previous one was of another edge."""
+        """Add a transform; return whether the previous transform belonged to another edge."""
         if stream is self.holder:
             return False
         self.holder = stream
@@ -182,7 +184,7 @@ class Handover:
     def is_one(self) -> bool:
         """Whether the frame changes parents from time to time.
 
-        If the edges alternate all the time, the frame jumps instead.
+        If the parents alternate all the time, the frame jumps instead.
         """
         return all((each.begun - 1) * MIN_RUN <= each.arrivals.count for each in self.streams)
 
@@ -197,17 +199,17 @@ class Traffic:
 
 @dataclass(frozen=True, slots=True)
 class EdgeState:
-    """State of an edge from one publisher at one time."""
+    """The state of an edge from a publisher at a given time."""
 
     stream: EdgeStream
-    #: Candidates for the publisher: one if it is certain, empty if no publisher has a name.
+    #: Candidates for the publisher: a single node if certain, empty if no publisher has a name.
     nodes: tuple[str, ...]
     timing: Timing
     #: Time since the newest message arrived.
     age_s: float
     #: Time since the newest stamp; None for fixed edges.
     data_age_s: float | None
-    #: True: the publisher is in the graph; None: there is no graph.
+    #: Whether the publisher is in the graph, None without a graph.
     present: bool | None = None
 
     @property
@@ -246,17 +248,17 @@ class EdgeState:
 class TreeObserver:
     """Observations of a TF tree."""
 
-    #: Time window of rates, jitter, gaps and delays (one to two windows); 0: everything.
+    #: Window for rates, jitter, gaps and delays in seconds (one to two windows); 0 for all time.
     window_s: float = 0.0
-    #: The first part of each edge that these ignore.
+    #: Initial time of each edge that these ignore, in seconds.
     settle_s: float = 0.0
     messages: int = 0
     sent: dict[bytes | None, Traffic] = field(default_factory=dict)
     begun_ns: int = 0
     last_ns: int = 0
-    #: End of a recording, of any topic; 0 for a running tree.
+    #: End of a recording on any topic; 0 for a running tree.
     end_ns: int = 0
-    #: When messages of a running tree were last taken.
+    #: Time when messages of a running tree were last read.
     observed_ns: int = 0
     #: Transforms of edges beyond the bounds, which are not kept, by publisher id.
     beyond: dict[bytes | None, int] = field(default_factory=dict)
@@ -279,14 +281,14 @@ class TreeObserver:
         received_ns: int,
         clock_ns: int | None = None,
     ) -> None:
-        """Take a message.
+        """Process a message.
 
         Args:
-            rows: its transforms.
-            static: whether it came on /tf_static.
-            gid: the publisher's id; None if unknown.
-            received_ns: its arrival.
-            clock_ns: the time to compare stamps with; default: ``received_ns``.
+            rows: the transforms of the message.
+            static: whether it arrived on /tf_static.
+            gid: the publisher's id, None if unknown.
+            received_ns: the arrival.
+            clock_ns: the time to compare stamps with, by default ``received_ns``.
         """
         self.begun_ns = self.begun_ns or received_ns
         self.messages += 1
@@ -322,9 +324,9 @@ class TreeObserver:
     def _new(
         self, row: Row, *, static: bool, gid: bytes | None, received_ns: int, is_full: bool
     ) -> EdgeStream | None:
-        """Return the stream of an edge that is new, or has a leading slash.
+        """Return the stream of an edge that is new or has a leading slash.
 
-        None if there are too many.
+        None if there are too many edges.
         """
         parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
         stream = self._streams.get((parent, child, gid, static))
@@ -350,24 +352,24 @@ class TreeObserver:
             self.malformed[gid] = self.malformed.get(gid, 0) + 1
 
     def take_graph(self, publishers: Sequence[Publisher], nodes: Sequence[str] = ()) -> None:
-        """Take the current publishers, and the names of the graph's nodes.
+        """Update the current publishers and the names of the graph's nodes.
 
-        Keeps what is known about publishers that have left.
+        Knowledge about publishers that have left is kept.
         """
         self.nodes = tuple(nodes)
         self.publishers.update(publishers)
 
     @property
     def until_ns(self) -> int:
-        """The time up to which anything is known: the recording's end, or the last look.
+        """The time up to which the observation extends: end of the recording, or the last read.
 
-        A late look therefore does not make publishers seem silent.
+        So a late read does not make publishers seem silent.
         """
         return self.end_ns or self.observed_ns or self.last_ns
 
     @property
     def received_any(self) -> bool:
-        """Whether any message came, readable or not."""
+        """Whether any message arrived, readable or not."""
         return bool(self.messages or self.malformed)
 
     @property
@@ -377,7 +379,7 @@ class TreeObserver:
 
     @property
     def streams(self) -> tuple[EdgeStream, ...]:
-        """Each edge of each publisher, in the order of their first arrivals."""
+        """The edges of all publishers, in the order of their first arrivals."""
         return tuple(self._streams.values())
 
     def edges(self, now_ns: int) -> list[EdgeState]:
@@ -388,8 +390,8 @@ class TreeObserver:
     def _state(self, stream: EdgeStream, now_ns: int) -> EdgeState:
         timing = stream.arrivals.timing(now_ns)
         age_s = max(0, now_ns - stream.arrivals.last_ns) * 1e-9
-        # By the clock that its stamps were compared with: the last delay is that of the last
-        # arrival.
+        # The age refers to the clock with which the stamps were compared, because the last delay
+        # belongs to the last arrival.
         data_age_s = None if stream.static else age_s + stream.delay_ns * 1e-9
         present = (
             None if self.recorded or stream.gid is None else stream.gid in self.publishers.present
@@ -406,12 +408,12 @@ class TreeObserver:
     def _publisher_nodes(self, stream: EdgeStream) -> tuple[str, ...]:
         """Return the publisher's node.
 
-        Without an id, return all nodes on the topic, or if they have left, all former ones.
+        Without an id, return all nodes on the topic. If these have left, return all former nodes.
         """
         nodes = self.publishers.nodes(stream.gid, static=stream.static)
         if nodes or stream.gid is not None:
             return nodes
-        left = self.publishers.known.values()
+        left = self.publishers.by_gid.values()
         return tuple(
             sorted(
                 {
@@ -432,21 +434,21 @@ class Branch:
     """A frame in a drawn tree."""
 
     frame: str
-    #: None: a root.
+    #: The parent, None for a root.
     parent: str | None
     #: The lines that lead to it.
     indent: str
-    #: Its edges from all publishers, the one that counts first.
+    #: Its edges from all publishers; the edge that tf2 uses comes first.
     observed: tuple[EdgeState, ...] = ()
-    #: The expected edge.
+    #: The edge in the plan.
     planned: PlanEdge | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """A root and all frames below it, in drawing order, or a loop.
+    """A root and all frames below it in drawing order, or a loop.
 
-    The loop has its first frame again at the end.
+    A loop ends with its first frame.
     """
 
     branches: tuple[Branch, ...]
@@ -458,8 +460,8 @@ def forest(
 ) -> list[Tree]:
     """Return the trees, the largest first, then the loops.
 
-    Includes planned edges (by child) without messages. A frame with several parents is drawn below
-    the parent of the newest message, as in tf2.
+    Planned edges without messages are included. A frame with several parents is drawn below the
+    parent of the newest message, as in tf2.
     """
     by_child: dict[str, list[EdgeState]] = {}
     for edge in edges:

@@ -1,8 +1,7 @@
 """Feeds: sources of messages for the observers of TF trees.
 
-A feed passes messages on pairs of topics (moving, fixed) to the observer of each pair: from ROS
-(``ros_feed``), from Zenoh if ROS has no rmw_zenoh (``zenoh_feed``), or from a recording
-(``tf.bags``).
+A feed passes messages on pairs of topics (moving, fixed) to the observer of each pair. Sources are
+ROS (``ros_feed``), Zenoh if ROS has no rmw_zenoh (``zenoh_feed``), and recordings (``tf.bags``).
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.signals import Stop
 
-#: A wait for messages is not longer, so that a signal is followed.
+#: Maximum wait for messages in seconds, so that signals are handled in time.
 WAIT_S = 0.1
 
 
@@ -52,15 +51,15 @@ def follow(
     every_s: float = WAIT_S,
     show: Callable[[], object] | None = None,
 ) -> float:
-    """Take from a feed for some seconds, or until ``stop`` is requested or the feed ends.
+    """Read from a feed for a time, or until ``stop`` is requested or the feed ends.
 
-    Calls ``show`` every ``every_s`` seconds. Return the seconds that it listened.
+    Call ``show`` every ``every_s`` seconds. Return the duration of the observation in seconds.
 
     Raises:
-        RosError: if ROS cannot take messages.
+        RosError: if ROS cannot receive messages.
         BagError: if a recording cannot be read.
     """
-    begun = time.monotonic()  # a slow machine may take seconds until it listens
+    begun = time.monotonic()  # on a slow machine, starting may take seconds
     end = float("inf") if duration_s is None else begun + duration_s
     due = begun + every_s
     while not stop.requested and (now := time.monotonic()) < end:
@@ -70,5 +69,5 @@ def follow(
             due = time.monotonic() + every_s
             if show is not None:
                 show()
-    feed.take(WAIT_S, stop)  # what came while this process was kept from looking
+    feed.take(WAIT_S, stop)  # messages that arrived while this process was suspended
     return time.monotonic() - begun

@@ -1,4 +1,4 @@
-"""Bounds for publishers that keep inventing edges: edges kept, and time to read."""
+"""Limits for publishers that keep inventing edges: number of edges, and time to read."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.node import Received
     from tfcompose.tf.ros.tf_codec import Decoder, Row
 
-#: Maximum number of edges kept of one publisher, unless its first message has more. No robot's
+#: Maximum number of edges to keep from a publisher, unless its first message has more. No robot's
 #: publisher sends more.
 MOST_OF_ONE = 10_000
-#: Maximum number of edges kept, counting an edge once for each publisher.
+#: Maximum number of edges to keep, counting an edge once for each publisher.
 MOST_EDGES = 20_000
-#: Time per second for reading messages with ever new edges of all senders, in seconds.
+#: Time per second for reading messages with ever new edges of all publishers, in seconds.
 BUSY_S = 0.1
 
 
 class ReadingTime:
-    """Bounds the time for unfamiliar messages from publishers of too many edges.
+    """Limits the time for unfamiliar messages from publishers of too many edges.
 
-    Their messages are skipped once this second's time is used up; ``skipped`` counts them.
+    After this second's time is used up, their messages are skipped. ``skipped`` counts them.
     """
 
     def __init__(self, decoder: Decoder) -> None:
@@ -40,7 +40,7 @@ class ReadingTime:
     ) -> None:
         """Read a message unless it must be skipped.
 
-        ``floods`` says whether its publisher sends too many edges.
+        ``floods`` returns whether its publisher sends too many edges.
         """
         decoder = self._decoder
         if now - self._since >= 1.0:
@@ -55,7 +55,7 @@ class ReadingTime:
 
 
 class EdgeBounds:
-    """The kept edges of each publisher.
+    """The edges to keep for each publisher.
 
     ``beyond`` counts transforms of all other edges, by publisher id.
     """
@@ -71,14 +71,14 @@ class EdgeBounds:
 
     def keep_rows(self, rows: Iterable[Row], gid: bytes | None) -> Iterator[Row]:
         """Yield the rows of a message whose edges are kept."""
-        known = self._known.setdefault(gid, set())
-        is_full = gid is not None and len(known) >= MOST_OF_ONE
+        gids = self._known.setdefault(gid, set())
+        is_full = gid is not None and len(gids) >= MOST_OF_ONE
         for row in rows:
             edge = row[:2]
-            if edge not in known:
+            if edge not in gids:
                 if is_full or self._all >= MOST_EDGES:
                     self.beyond[gid] = self.beyond.get(gid, 0) + 1
                     continue
-                known.add(edge)
+                gids.add(edge)
                 self._all += 1
             yield row

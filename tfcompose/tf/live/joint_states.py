@@ -1,4 +1,4 @@
-"""Senders of joint states: the joints that each publisher of a topic sends."""
+"""Publishers of joint states on a topic, and the joints that each of them sends."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.node import Received
 
 
-#: A publisher that splits its joints over messages sends each list of names again and again.
+#: Maximum number of lists to remember. A publisher that splits its joints over several messages
+#: sends each list of names repeatedly.
 MOST_LISTS = 64
 
 
@@ -50,7 +51,7 @@ class JointStates:
         self._nodes: dict[bytes, str] = {}
 
     def take(self) -> None:
-        """Read pending messages with their senders; skip messages that are not joint states."""
+        """Read pending messages with their publishers. Skip messages that are not joint states."""
         for received in self._subscription.take():
             self._take(received)
         if self._sent.keys() - self._nodes.keys():
@@ -66,12 +67,12 @@ class JointStates:
                 names = read_names(received.data)
             except ValueError:
                 return
-        others = [names_at for names_at in sent.lists if names_at[0] is not names]
-        sent.lists = [*others[1 - MOST_LISTS :], (names, now_ns)]
+        earlier = [names_at for names_at in sent.lists if names_at[0] is not names]
+        sent.lists = [*earlier[1 - MOST_LISTS :], (names, now_ns)]
         self._sent[gid] = sent
 
     def sent_joints(self) -> tuple[SentJoints, ...]:
-        """Return what each publisher sent, including those that have left."""
+        """Return the joints of each publisher, including publishers that have left."""
         return tuple(
             SentJoints(
                 self.topic,
@@ -84,7 +85,7 @@ class JointStates:
         )
 
     def forget(self, before_ns: int) -> None:
-        """Drop what was last sent before that time, in nanoseconds of the system clock."""
+        """Drop joints last sent before this time, in nanoseconds of the system clock."""
         for sent in self._sent.values():
             sent.lists = [names_at for names_at in sent.lists if names_at[1] >= before_ns]
         self._sent = {gid: sent for gid, sent in self._sent.items() if sent.lists}

@@ -1,4 +1,4 @@
-"""Requested poses of one frame in another, live or from a bag, and the reason if there is none."""
+"""Requested poses of a frame in another frame, live or from a bag, and the reason if missing."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Pose
     from tfcompose.tf.tf2 import Buffer
 
-    #: Is given each pose, with its time in nanoseconds; None: all edges are fixed.
+    #: Receives each pose with its time in nanoseconds, None if all edges are fixed.
     OnPose = Callable[[Pose, int | None], None]
 
 
 @dataclass(frozen=True, slots=True)
 class PoseQuery:
-    """Request for poses of one frame in another."""
+    """A request for poses of a frame in another frame."""
 
     #: The reference frame.
     target: str
@@ -26,18 +26,19 @@ class PoseQuery:
     once: bool
     #: Poses per second, unless ``once``.
     rate: float
-    #: Without a new pose for this time, the query ends.
+    #: The query ends after this time without a new pose, in seconds.
     timeout_s: float
     #: The topics of moving and of fixed edges.
     topics: tuple[str, str]
-    #: Time of the pose in nanoseconds since the epoch; 0 or below: relative to the newest.
+    #: Time of the pose in nanoseconds since the epoch. If it is 0 or negative, it is relative to
+    #: the newest pose.
     at_ns: int = 0
 
     def pose_in(self, buffer: Buffer) -> tuple[Pose, int | None]:
-        """Return the pose with its time in nanoseconds; None: all edges are fixed.
+        """Return the pose with its time in nanoseconds, None if all edges are fixed.
 
         Raises:
-            TransformException: if there is none.
+            TransformException: if there is no pose.
         """
         if self.at_ns > 0:
             return buffer.lookup(self.target, self.source, self.at_ns)
@@ -49,9 +50,9 @@ class PoseQuery:
 
 @dataclass(frozen=True, slots=True)
 class NoPose:
-    """The reason for a missing pose, with advice if more is known."""
+    """The reason for a missing pose, and advice if available."""
 
     reason: str
     help: str = ""
-    #: Other topics with TF, if nothing came on these; None: messages came.
+    #: Other topics with TF if no message arrived on these topics, None if messages arrived.
     elsewhere: tuple[str, ...] | None = None

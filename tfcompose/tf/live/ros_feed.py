@@ -29,13 +29,14 @@ if TYPE_CHECKING:
 
     Topics = tuple[str, str]
 
-#: The graph is asked so often, in seconds, and sooner where somebody sends who has no name yet.
+#: Interval between queries of the graph in seconds. It is queried sooner if a sender has no name
+#: yet.
 ASK_EVERY_S = 0.5
 ASK_AGAIN_S = 0.02
 
 
 class TreeListener:
-    """Feeds an observer from a pair of TF topics (moving, fixed) while its node lives.
+    """Feeds an observer from a pair of TF topics (moving, fixed), while its node exists.
 
     If a simulator publishes /clock, stamps that are nearer to /clock than to system time are
     compared with /clock.
@@ -51,7 +52,7 @@ class TreeListener:
         self._decoder = Decoder()
         self._time = ReadingTime(self._decoder)
         self._requested_at = float("-inf")
-        #: By how much the clock of each publisher is ahead at least, in seconds, by its id.
+        #: Minimum lead of each publisher's clock in seconds, by the publisher's id.
         self.skews_s: dict[bytes, float] = {}
 
     @property
@@ -77,7 +78,8 @@ class TreeListener:
             except ValueError:
                 self.observer.take_malformed(received.gid)
                 return
-            # Fast DDS tells when a message came; what waited here for its turn is not late.
+            # Fast DDS reports the arrival of a message, so waiting for this code does not count as
+            # a delay.
             came_ns = received.received_ns or now_ns
             clock_ns = nearer_clock(rows, came_ns, sim_ns, static=data.static)
             self.observer.take(
@@ -108,12 +110,12 @@ class TreeListener:
 
 
 class RosFeed:
-    """Feeds the observers of pairs of TF topics (moving, fixed) from a node of that name.
+    """Feeds the observers of pairs of TF topics (moving, fixed), with a node of its own.
 
     Args:
-        name: the node's.
-        observers: by topics.
-        joint_topics: topics of joint states whose senders and joints it observes.
+        name: the name of the node.
+        observers: observers by topics.
+        joint_topics: topics of joint states, whose publishers and joints are observed.
     """
 
     def __init__(
@@ -142,10 +144,14 @@ class RosFeed:
 
     def __exit__(self, *_: object) -> None:
         """Pass the senders of joint states to the observers, and end the node."""
+        self.pass_joints()
+        self._stack.close()
+
+    def pass_joints(self) -> None:
+        """Pass the senders of joint states so far to the observers."""
         sent = tuple(sent for joints in self._joints for sent in joints.sent_joints())
         for observer in self._observers.values():
             observer.sent_joints = sent
-        self._stack.close()
 
     @property
     def clock_ns(self) -> int | None:
@@ -168,16 +174,16 @@ class RosFeed:
 
     def elsewhere(self) -> tuple[str, ...]:
         """Return the names of other topics with TF."""
-        own = [topic for pair in self._observers for topic in pair]
-        return tf_elsewhere(topics(self.node), own)
+        observed = [topic for pair in self._observers for topic in pair]
+        return tf_elsewhere(topics(self.node), observed)
 
 
 def tf_elsewhere(
-    topics: Iterable[tuple[str, Sequence[str]]], own: Iterable[str]
+    topics: Iterable[tuple[str, Sequence[str]]], observed: Iterable[str]
 ) -> tuple[str, ...]:
-    """Return the names of TF topics, of (name, types), except ours and hidden ones (``/_…``)."""
+    """Return names of further TF topics from (name, types), without hidden ones (``/_…``)."""
     return tuple(
         name
         for name, types in topics
-        if TF_MESSAGE in types and name not in set(own) and "/_" not in name
+        if TF_MESSAGE in types and name not in set(observed) and "/_" not in name
     )

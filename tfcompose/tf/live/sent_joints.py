@@ -1,4 +1,4 @@
-"""The joints that a publisher sends states of."""
+"""The joints whose states a publisher sends."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class SentJoints:
     """The joints that a publisher of joint states sent on a topic."""
 
     topic: str
-    #: Its full name; empty: unknown so far.
+    #: The publisher's full node name; empty while unknown.
     node: str
     joints: frozenset[str]
     #: Arrival of its first message, in nanoseconds of the system clock.

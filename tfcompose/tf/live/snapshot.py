@@ -1,7 +1,7 @@
-"""Observation of the running system for a while; returns the state that the doctor judges.
+"""Observation of the running system for a time; returns the state that the doctor judges.
 
-Besides TF it observes consumers of TF: headers of sensor data, joint states, and the robot
-description.
+In addition to TF it observes data of TF's consumers: headers of sensor data, joint states, and the
+robot description.
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
 
 
-#: Number of headers that show what a topic's are like. After them the topic is closed, because its
-#: data may be large.
+#: Number of headers to read from a topic. Afterwards the subscription is closed, because the data
+#: may be large.
 ENOUGH = 20
-#: Maximum number of topics that are subscribed.
+#: Maximum number of topics to subscribe to.
 MOST = 100
 
 
 class SensorTopics:
     """Subscriptions to the topics below a namespace.
 
-    ``moving_joints`` are those of the newest description.
+    ``moving_joints`` are the moving joints of the newest description.
     """
 
     TYPES: ClassVar = frozenset({*HEADED, JOINT_STATE_TYPE})
@@ -76,7 +76,7 @@ class SensorTopics:
     def subscribe(self, graph: Iterable[TopicState], robots_inside: tuple[str, ...]) -> None:
         """Subscribe to new topics.
 
-        Except those of robots inside, which have their own TF topics.
+        Topics of robots below this namespace, which have their own TF topics, are excluded.
         """
         for topic in graph:
             inside = topic.name.startswith(f"{self._prefix}/") and not topic.name.startswith(
@@ -140,12 +140,12 @@ class SensorTopics:
         self._node.destroy_subscription(subscription.subscription)
 
 
-#: Joints that a state moves.
+#: Types of joints that joint states move.
 MOVING = frozenset({"revolute", "continuous", "prismatic"})
 
 
 class _JointReader:
-    """Reads the joints of a URDF; stops at a document type or entity."""
+    """Reads the joints of a URDF. Stops at a document type or an entity."""
 
     def __init__(self) -> None:
         self.joints: list[MovingJoint] = []
@@ -199,21 +199,23 @@ def joints_of(description: str) -> tuple[MovingJoint, ...]:
 
 WAIT_S = 0.05
 ASK_EVERY_S = 0.5
-#: A simulator or a player sends its time much more often.
+#: /clock counts as stopped after this time in seconds. Simulators and players publish it much more
+#: often.
 CLOCK_STANDS_S = 2.0
-#: Nodes of tools that look, as this one does, say nothing about the robot; a plan's do.
+#: Prefixes of nodes of observing tools, such as this one. They are ignored, unless a plan contains
+#: them.
 TOOLS = ("/tfcompose_", "/_ros2cli_")
 #: Types of topics that are observed in addition to TF itself.
 INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs/msg/JointState")
 
 
 def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) -> list[TreeState]:
-    """Observe the topics (moving, fixed) for that many seconds, or until ``stop`` is requested.
+    """Observe the topics (moving, fixed) for this many seconds, or until ``stop`` is requested.
 
     Each pair of topics may have a plan with the expected edges. Return a state for each pair.
 
     Raises:
-        RosError: if ROS cannot start a node, or take messages.
+        RosError: if ROS cannot start a node or receive messages.
     """
     observers = {pair: TreeObserver(0.0, SETTLE_S) for pair in expected}
     with RosFeed("tfcompose_doctor", observers) as feed:
@@ -238,7 +240,7 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
         listened_s = follow(feed, stop, duration_s=seconds, every_s=WAIT_S, show=scan)
         for view in views:
             view.take()
-        # The newest counts, but what was seen before is not forgotten.
+        # The newest endpoints replace earlier ones, but topics that have vanished are kept.
         graph |= topics_in(node, robot)
         common = TreeState(
             listened_s,
@@ -261,7 +263,8 @@ class _TopicPair:
         self.topics = listener.topics
         self.namespace = self.topics[0].removesuffix("/tf")
         self.sensors = SensorTopics(listener.node, self.namespace)
-        #: The newest time on /clock, and when it moved, of the monotonic clock; 0: not yet.
+        #: The newest time on /clock, and the monotonic time of its last change; 0 before the
+        #: first.
         self._clock: tuple[int | None, float] = (None, 0.0)
         self._taken_at = 0.0
 
@@ -313,11 +316,11 @@ def _is_tool(name: str, robot: frozenset[str]) -> bool:
 
 
 def topics_in(node: Node, robot: frozenset[str] = frozenset()) -> dict[str, TopicState]:
-    """Return the topics that matter to TF with their endpoints, by name and type.
+    """Return the topics that are relevant to TF with their endpoints, by name and type.
 
-    Endpoints of tools are left out, except for nodes of the ``robot``.
+    Endpoints of tools are excluded, except nodes of the ``robot``.
     """
-    found = {}
+    names = {}
     for name, types in topics(node):
         if name not in GLOBAL and not set(types) & {*INTERESTING, *SensorTopics.TYPES}:
             continue
@@ -330,12 +333,12 @@ def topics_in(node: Node, robot: frozenset[str] = frozenset()) -> dict[str, Topi
                 dict.fromkeys(who for who, type_, sends in both if not sends and type_ == kind)
             )
             if senders or readers:
-                found[f"{name} {kind}"] = TopicState(name, kind, senders, readers)
-    return found
+                names[f"{name} {kind}"] = TopicState(name, kind, senders, readers)
+    return names
 
 
 def _robots_inside(view: _TopicPair, graph: dict[str, TopicState]) -> tuple[str, ...]:
-    """Return the namespaces, below this one, of robots with their own TF topics."""
+    """Return the namespaces below this namespace of robots with their own TF topics."""
     names = {
         topic.name.removesuffix("/tf")
         for topic in graph.values()

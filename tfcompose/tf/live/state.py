@@ -1,4 +1,4 @@
-"""State of a live tree or of a recording, as the input of verdicts."""
+"""State of a live tree or a recording, which verdicts judge."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NO_NODE = "a DDS program that is not a ROS node"
 
 @dataclass(frozen=True, slots=True)
 class TopicState:
-    """A topic of the graph: its type, such as ``sensor_msgs/msg/LaserScan``, and nodes."""
+    """A topic of the graph, with its type, such as ``sensor_msgs/msg/LaserScan``, and nodes."""
 
     name: str
     type: str
@@ -34,22 +34,25 @@ class TopicState:
 
 @dataclass(frozen=True, slots=True)
 class StampedData:
-    """Messages with a header on a topic, of one frame."""
+    """Messages with a header on a topic, with the same frame."""
 
     topic: str
     frame: str
     nodes: tuple[str, ...]
-    #: Ages of the stamps at their arrival, in seconds of the nearest clock; negative: ahead of it.
+    #: Ages of the stamps on arrival, in seconds by the nearest clock; negative if ahead of it.
     delays_s: tuple[float, ...]
-    #: The newest message's stamp; None: unknown.
+    #: The newest message's stamp, None if unknown.
     stamp_ns: int | None = None
-    #: The newest message's arrival by the system clock; 0: unknown.
+    #: The newest message's arrival by the system clock; 0 if unknown.
     received_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class MovingJoint:
-    """A moving joint of the robot description; a subscriber to joint states publishes its edge."""
+    """A moving joint of the robot description.
+
+    A node that subscribes to joint states publishes it.
+    """
 
     name: str
     parent: str
@@ -70,7 +73,7 @@ class RosProcess:
 class TreeState:
     """Observations on a pair of TF topics."""
 
-    #: Duration of the observation.
+    #: Duration of the observation in seconds.
     seconds: float
     #: The topics (moving, fixed).
     topics: tuple[str, str] = GLOBAL
@@ -78,15 +81,15 @@ class TreeState:
     edges: tuple[EdgeState, ...] = ()
     #: The publishers on the two topics.
     publishers: tuple[Publisher, ...] = ()
-    #: Nodes that subscribe to fixed edges without requesting latched messages.
+    #: Nodes that subscribe to fixed edges but do not request latched messages.
     volatile_readers: tuple[str, ...] = ()
     #: Full names of other nodes, of this robot or not.
     nodes: tuple[str, ...] = ()
     #: All topics, including those of TF.
     graph: tuple[TopicState, ...] = ()
-    #: The newest time on /clock; None: none came.
+    #: The newest time on /clock, None without one.
     clock_ns: int | None = None
-    #: True: that time changed recently.
+    #: Whether that time has changed recently.
     clock_moves: bool = False
     #: Messages with a header.
     stamped: tuple[StampedData, ...] = ()
@@ -94,22 +97,22 @@ class TreeState:
     moving_joints: tuple[MovingJoint, ...] = ()
     #: The senders of joint states, with their joints.
     sent_joints: tuple[SentJoints, ...] = ()
-    #: The environment variables that set up ROS here.
+    #: The environment variables of ROS in this process.
     settings: Mapping[str, str] = field(default_factory=dict)
-    #: Other processes of this machine with ROS, as far as they can be inspected.
+    #: Other processes of this machine that have ROS loaded and can be inspected.
     processes: tuple[RosProcess, ...] = ()
-    #: Minimum lead of the clock of a publisher's machine over this one's, by id; negative: it
-    #: lags, or messages take that long.
+    #: Minimum lead of the clock of a publisher's machine over this machine's clock, by the
+    #: publisher's id. It is negative if that clock lags or messages take that long.
     skews_s: Mapping[bytes, float] = field(default_factory=dict)
     #: Number of messages that are not TFMessage, by publisher id.
     malformed: Mapping[bytes | None, int] = field(default_factory=dict)
-    #: Number of transforms of edges that are not kept, because their publisher sends too many, by
-    #: its id.
+    #: Number of transforms of edges that are not kept because their publisher sends too many, by
+    #: the publisher's id.
     beyond: Mapping[bytes | None, int] = field(default_factory=dict)
     plan: Plan | None = None
     #: Traffic of each publisher on the topic of moving edges, by its id.
     sent: Mapping[bytes | None, Traffic] = field(default_factory=dict)
-    #: True: a recording, which does not identify publishers.
+    #: Whether this is a recording, which does not identify publishers.
     recorded: bool = False
 
     @property
@@ -119,17 +122,17 @@ class TreeState:
 
     @property
     def taken(self) -> list[EdgeState]:
-        """The edges that tf2 accepts, of each publisher."""
+        """The edges of all publishers that tf2 accepts."""
         return [edge for edge in self.edges if edge.stream.is_taken]
 
     @property
     def moving(self) -> list[EdgeState]:
-        """The accepted edges that come on /tf."""
+        """The accepted edges on /tf."""
         return [edge for edge in self.taken if not edge.stream.static]
 
     @property
     def planned(self) -> frozenset[str]:
-        """The frames whose owner a plan declares."""
+        """The frames whose owner is in a plan."""
         return frozenset(edge.child for edge in self.plan.edges) if self.plan else frozenset()
 
     @property
@@ -143,9 +146,9 @@ class TreeState:
 
     @property
     def simulated(self) -> bool:
-        """Whether stamps should be of simulated time.
+        """Whether stamps should have simulated time.
 
-        The plan says so, or most edges are nearer to /clock.
+        That is so if the plan says so, or if most edges are nearer to /clock than to system time.
         """
         if self.plan and self.plan.ros.clock == "sim":
             return True

@@ -1,6 +1,6 @@
 """Feeds observers from TF on Zenoh, for machines whose ROS has no rmw_zenoh.
 
-Liveliness tokens name the sender of each message.
+Liveliness tokens identify the sender of each message.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _publisher(token: TokenOfPublisher, *, static: bool) -> Publisher:
 
 
 class ZenohFeed:
-    """Feeds the observers of pairs of TF topics (moving, fixed) from its own session."""
+    """Feeds the observers of pairs of TF topics (moving, fixed) from its own Zenoh session."""
 
     def __init__(self, observers: Mapping[Topics, TreeObserver]) -> None:
         self._observers = observers
@@ -105,7 +105,7 @@ class ZenohFeed:
 
     def take(self, timeout_s: float, stop: Stop) -> bool:
         """Wait up to ``timeout_s`` seconds for messages, and pass them to the observers."""
-        del stop  # it wakes nobody here
+        del stop  # the wait cannot be interrupted
         for listener in self._listeners:
             listener.take(timeout_s / len(self._listeners))
         return True

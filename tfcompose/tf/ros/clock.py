@@ -10,7 +10,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from tfcompose.tf.ros.graph import publishing_nodes
-from tfcompose.tf.ros.node import Subscription, qos
+from tfcompose.tf.ros.node import DEEP, Subscription, qos
 from tfcompose.tf.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
 
 if TYPE_CHECKING:
@@ -18,27 +18,35 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-#: A missing simulated time is reported after this many seconds; otherwise a plan with ``ros.clock:
-#: sim`` would silently stand still.
+#: Time in seconds after which a missing simulated time is reported. Without the report, a plan
+#: with ``ros.clock: sim`` would silently do nothing.
 CLOCK_AFTER_S = 5.0
 
 _LENGTH = 12
 _SECOND_NS = 1_000_000_000
-# rclcpp's ClockQoS: only the newest time counts.
+# As rclcpp's ClockQoS: only the newest time matters.
 _QOS = qos(1, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
 
 
+class DeepClockSubscription(Subscription):
+    """A subscription to /clock that loses as few messages as possible."""
+
+    def __init__(self, node: Node) -> None:
+        profile = qos(DEEP, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+        super().__init__(node, ClockMessage, "/clock", profile)
+
+
 class SimClock:
-    """The newest time on /clock. Wait for ``subscription``, then ask ``now_ns``."""
+    """The newest time on /clock. Wait for ``subscription``, then call ``now_ns``."""
 
     def __init__(self, node: Node) -> None:
         self.subscription = Subscription(node, ClockMessage, "/clock", _QOS)
         self._now_ns: int | None = None
 
     def now_ns(self) -> int | None:
-        """Return the newest simulated time in nanoseconds, or None before the first.
+        """Return the newest simulated time in nanoseconds, None before the first.
 
-        Skips messages that are not a time.
+        Messages that are not a time are skipped.
         """
         for received in self.subscription.take():
             read_ns = read_clock(received.data)
@@ -49,8 +57,8 @@ class SimClock:
 class StampClock:
     """Time for messages without a stamp: their arrival, or simulated time.
 
-    Subscribes to /clock only when the first such message arrives. ``say`` receives lines for the
-    user.
+    It subscribes to /clock only when the first such message arrives. ``say`` receives lines for
+    the user.
     """
 
     def __init__(self, node: Node, say: Callable[[str], None], *, sim: bool) -> None:
@@ -60,7 +68,7 @@ class StampClock:
         self.is_waiting = False
 
     def now_ns(self, received_ns: int) -> int | None:
-        """Return the time in ns for a message that arrived then; None while there is none."""
+        """Return the time in ns for a message with this arrival, None while no time is known."""
         if not self._sim:
             return received_ns
         if self._clock is None:
@@ -81,7 +89,7 @@ class StampClock:
 
 
 class ClockWatch:
-    """Waits for the first message on /clock, if the plan's time is simulated.
+    """Waits for the first message on /clock, if the plan uses simulated time.
 
     Afterwards ``check`` costs nothing.
     """
@@ -92,7 +100,7 @@ class ClockWatch:
         self._clock = SimClock(node) if sim else None
 
     def check(self) -> None:
-        """Report after some seconds that none has come, and who should have sent it."""
+        """Report after some seconds that no time has arrived, and which node should publish it."""
         if self._clock is None or (self._clock.now_ns() is None and time.monotonic() < self._due):
             return
         if self._clock.now_ns() is None:
@@ -102,7 +110,7 @@ class ClockWatch:
 
 
 def no_clock(node: Node) -> str:
-    """Return the sentence that no simulated time has come, and who publishes it."""
+    """Return the sentence that no simulated time has arrived, with the publishers of /clock."""
     names = publishing_nodes(node, "/clock")
     who = (
         f"{', '.join(names)} publishes it and has sent nothing" if names else "nobody publishes it"
@@ -111,7 +119,7 @@ def no_clock(node: Node) -> str:
 
 
 def read_clock(data: bytes) -> int | None:
-    """Return the time of a rosgraph_msgs/Clock in nanoseconds, or None for other bytes.
+    """Return the time of a rosgraph_msgs/Clock in nanoseconds, None for other bytes.
 
     Layout (OMG CDR): four bytes of header, int32 seconds, uint32 nanoseconds.
     """
@@ -122,5 +130,5 @@ def read_clock(data: bytes) -> int | None:
 
 
 def wall_ns() -> int:
-    """Return system time in nanoseconds since the epoch, as nodes without simulated time stamp."""
+    """Return system time in nanoseconds since the epoch, the stamp without simulated time."""
     return time.time_ns()

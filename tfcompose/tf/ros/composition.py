@@ -1,8 +1,8 @@
 """The services of a component container: load, unload and list, called without blocking.
 
-Facts of rclcpp_components (ROS 2 Jazzy): a container carries out one request after the other, and
-answers a load when the component's constructor has returned. It reports a failure in
-``error_message``. Needs composition_interfaces, which comes with the containers.
+In ROS 2 Jazzy, a container of rclcpp_components handles requests in sequence. It answers a load
+request after the component's constructor has returned, and reports a failure in ``error_message``.
+This module needs composition_interfaces, which is installed with the containers.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Environment of a process that uses ROS: rclpy, and the variables that ROS reads at its start.
 
-With some settings, ROS ends the process that starts a node, without a message. ``ros_trouble``
-finds these beforehand. This module imports no ROS, so that any module can ask whether ROS is
-installed.
+With some settings, ROS ends a process that starts a node without any message. ``ros_trouble``
+detects these settings beforehand. This module imports no ROS, so that any module can check whether
+ROS is installed.
 """
 
 from __future__ import annotations
@@ -23,33 +23,34 @@ if TYPE_CHECKING:
 
     from tfcompose.model.plan import Distro, RosSettings
 
-#: The profile of tfcompose's own processes, and the one for this machine alone; the files say what
-#: for.
+#: Profiles for tfcompose's processes, in general and on a single machine. The files explain their
+#: purpose.
 FASTDDS_PROFILE = Path(__file__).with_name("fastdds.xml")
 FASTDDS_PROFILE_LOCALHOST = Path(__file__).with_name("fastdds_localhost.xml")
 
-# Fast DDS 2 reads the first, Fast DDS 3 the second. A user who sets either has decided.
+# Fast DDS 2 reads the first variable, Fast DDS 3 the second. If the user has set either, it is
+# kept.
 PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 
 DOMAIN, RANGE, RMW = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "RMW_IMPLEMENTATION"
 DISTRO = "ROS_DISTRO"
-#: The release of ROS, by the major version of its rclpy, which is a package of that name, or a
-#: wheel with another.
+#: The ROS release by the major version of rclpy. rclpy is a package of that name, or a wheel with
+#: another name.
 _RELEASES: Mapping[str, Distro] = {"7": "jazzy", "9": "kilted"}
 _RCLPY = ("rclpy", "ros-rclpy")
-#: A port number holds no more domains (RTPS: 7400 + 250 times the domain, below 65536).
+#: The highest domain whose ports exist (RTPS: 7400 + 250 times the domain, below 65536).
 LAST_DOMAIN = 232
 
 
 class RosError(Exception):
-    """Raised when ROS is installed and cannot be used as needed.
+    """ROS is installed but cannot be used as needed.
 
-    The message is one sentence for the user.
+    The message is a sentence for the user.
     """
 
 
 def missing_ros() -> str | None:
-    """Return None if rclpy can be imported, else one sentence that says what to install."""
+    """Return a sentence that tells what to install, None if rclpy can be imported."""
     if find_spec("rclpy") is not None:
         return None
     return (
@@ -59,12 +60,14 @@ def missing_ros() -> str | None:
     )
 
 
-def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -> dict[str, str]:
+def child_environment(
+    base: Mapping[str, str], ros: RosSettings, *, is_built_in: bool
+) -> dict[str, str]:
     """Return ``base`` with the plan's ROS settings.
 
-    Settings that the plan leaves open stay as in ``base``. ``own``: the process is one of
-    tfcompose's, and uses the discovery profile ``FASTDDS_PROFILE``, or the one for this machine
-    alone, unless ``base`` already names a profile file or the middleware is not Fast DDS. Other
+    Settings that the plan does not state stay as in ``base``. ``is_built_in``: the process belongs
+    to tfcompose. It uses the discovery profile ``FASTDDS_PROFILE``, or the profile for a single
+    machine, unless ``base`` already names a profile file or the middleware is not Fast DDS. Other
     processes keep their profile.
     """
     environment = {**base, "PYTHONUNBUFFERED": "1", **middleware_variables(ros, base)}
@@ -72,7 +75,11 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
         environment[DOMAIN] = str(ros.domain_id)
     if ros.discovery is not None:
         environment[RANGE] = ros.discovery.upper()
-    if own and is_fastdds(environment) and not any(base.get(name) for name in PROFILE_VARIABLES):
+    if (
+        is_built_in
+        and is_fastdds(environment)
+        and not any(base.get(name) for name in PROFILE_VARIABLES)
+    ):
         alone = environment.get(RANGE) == "LOCALHOST"
         environment[PROFILE_VARIABLES[0]] = str(
             FASTDDS_PROFILE_LOCALHOST if alone else FASTDDS_PROFILE
@@ -81,12 +88,12 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
 
 
 def is_fastdds(environment: Mapping[str, str]) -> bool:
-    """Return whether processes with this environment use Fast DDS, the default."""
+    """Return whether processes with this environment use Fast DDS, which is the default."""
     return (environment.get(RMW) or IMPLEMENTATIONS["fastdds"]).startswith("rmw_fastrtps")
 
 
 def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) -> Finding | None:
-    """Return the finding that keeps a process from starting a node here, or None.
+    """Return the finding that prevents a process from starting a node here, or None.
 
     ``ros`` are the plan's settings.
     """
@@ -100,9 +107,9 @@ def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) 
 
 
 def installed_distro(environment: Mapping[str, str]) -> str | None:
-    """Return the ROS release set up here, from its variable or rclpy: ``jazzy``; or None."""
-    if found := environment.get(DISTRO):
-        return found
+    """Return the ROS release in this environment, such as ``jazzy``, None if unknown."""
+    if distro := environment.get(DISTRO):
+        return distro
     for name in _RCLPY:
         with suppress(PackageNotFoundError):
             return _RELEASES.get(version(name).partition(".")[0])
@@ -110,7 +117,7 @@ def installed_distro(environment: Mapping[str, str]) -> str | None:
 
 
 def other_distro(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
-    """Return a warning if another release of ROS is set up than the plan names, or None."""
+    """Return a warning if the environment's ROS release is not the plan's, or None."""
     here = installed_distro(environment)
     if ros.distro is None or here in {None, ros.distro}:
         return None
@@ -123,34 +130,38 @@ def other_distro(environment: Mapping[str, str], ros: RosSettings) -> Finding | 
 
 
 def reads_zenoh_alone(environment: Mapping[str, str]) -> bool:
-    """Return whether TF on Zenoh has to be, and can be, read without ROS.
+    """Return whether TF on Zenoh must be read without ROS, and can be.
 
-    It needs eclipse-zenoh, from the extra ``zenoh``.
+    This requires eclipse-zenoh from the extra ``zenoh``.
     """
-    wanted = (
+    needs_zenoh = (
         environment.get(RMW) == IMPLEMENTATIONS["zenoh"]
         and find_spec("zenoh")
         and find_spec("xxhash")
     )
-    return bool(wanted) and (
+    return bool(needs_zenoh) and (
         missing_ros() is not None or _middleware(IMPLEMENTATIONS["zenoh"], None) is not None
     )
 
 
 def other_middleware(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
-    """Return a warning if the environment names another middleware than the plan, or None.
+    """Return a warning if the environment's middleware is not the plan's, or None.
 
-    Tools then do not see the robot's processes.
+    Tools do not discover the robot's processes in that case.
     """
-    here, wanted = environment.get(RMW), IMPLEMENTATIONS[ros.rmw] if ros.rmw else None
-    if not here or wanted in {None, here}:
+    here, implementation = environment.get(RMW), IMPLEMENTATIONS[ros.rmw] if ros.rmw else None
+    if not here or implementation in {None, here}:
         return None
     message = (
         f"{RMW}={here} in this environment, and the robot has ros: {{rmw: {ros.rmw}}}: tools from"
         " here do not see it"
     )
     return finding(
-        "TF909", message, None, severity="warning", help=f"export {RMW}={wanted}, or change rmw"
+        "TF909",
+        message,
+        None,
+        severity="warning",
+        help=f"export {RMW}={implementation}, or change rmw",
     )
 
 
@@ -191,21 +202,21 @@ def _domain(domain: str) -> Finding | None:
 
 
 def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
-    """Look for the library as ROS does.
+    """Search for the library of the middleware, as ROS does.
 
-    Without it, ROS ends the process as soon as it is imported.
+    Without it, ROS ends the process as soon as ROS is imported.
     """
     if not name:
         return None
     try:
         ctypes.CDLL(f"lib{name}.so")
     except OSError:
-        found = {
+        installed = {
             file.stem.removeprefix("lib")
             for folder in _folders()
             for file in folder.glob("librmw_*_cpp.so")
         }
-        here = sorted(name for name in found if "_shared_" not in name and "__" not in name)
+        here = sorted(name for name in installed if "_shared_" not in name and "__" not in name)
         package = f"ros-{_release(ros)}-{name.replace('_', '-')}"
         advice, message = (
             f"unset {RMW}, or install {package}",
@@ -230,12 +241,12 @@ def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
 
 
 def _release(ros: RosSettings | None) -> str:
-    """Return the ROS release to name in package advice."""
+    """Return the ROS release for names of packages in advice."""
     return (ros and ros.distro) or os.environ.get(DISTRO) or "jazzy"
 
 
 def _configuration(environment: Mapping[str, str]) -> Finding | None:
-    """Check the files that configure Zenoh; if one is missing, every session ends at once."""
+    """Check the files that configure Zenoh. If a file is missing, every session ends at once."""
     for name in ZENOH_FILES if environment.get(RMW) == IMPLEMENTATIONS["zenoh"] else ():
         file = environment.get(name)
         if file and not Path(file).is_file():

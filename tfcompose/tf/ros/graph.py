@@ -1,11 +1,11 @@
 """Publishers and subscribers of the ROS graph, and the sender of each message.
 
-rmw gives a publisher's id twice: with each message, and in the graph, which also has its node's
-name. With rmw_fastrtps the two are equal. With rmw_cyclonedds the id of a message is a number
-private to the receiving process (rmw_cyclonedds#446): it distinguishes senders without identifying
-them. ``rmw_get_gid_for_publisher`` returns the message id of one's own publisher, so every rmw can
-be tested for its kind. If rmw_zenoh's graph lacks the ids of messages, its liveliness tokens have
-them, and eclipse-zenoh reads these.
+rmw reports a publisher's id in two places: with each message, and in the graph together with the
+name of the node. With rmw_fastrtps the two ids are equal. With rmw_cyclonedds, the id of a message
+is a number private to the receiving process (rmw_cyclonedds#446). It distinguishes senders but
+does not identify them. To find out which kind an rmw is, this module creates a publisher, gets the
+id of its messages from ``rmw_get_gid_for_publisher``, and searches for it in the graph. If it is
+missing with rmw_zenoh, eclipse-zenoh reads the ids from Zenoh's liveliness tokens.
 """
 
 from __future__ import annotations
@@ -37,57 +37,57 @@ if TYPE_CHECKING:
 
     from tfcompose.tf.ros.zenoh_graph import RobotGraph
 
-#: Name that rmw gives while it does not know a publisher's node.
+#: Node name that rmw reports until it has discovered a publisher's node.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 #: Name and namespace that rmw_fastrtps gives to a publisher without a ROS node.
 BARE_DDS = "_CREATED_BY_BARE_DDS_APP_"
-#: Topic on which the rmw is probed for the ids that come with messages; its leading underscore
-#: hides it from lists of topics.
+#: Topic of the publisher that tests the rmw's ids. Its leading underscore hides it from lists of
+#: topics.
 ASKING = "/_tfcompose/who_am_i"
-#: Time within which one's own publisher must appear in the graph, in seconds.
+#: Time within which the test publisher must appear in the graph, in seconds.
 SHOWN_WITHIN_S = 0.5
 
-#: Number of publishers and listeners whose names are remembered.
+#: Maximum number of publishers and listeners whose names are remembered.
 MOST_NAMES = 10_000
 
 #: Sizes of a wait set: subscriptions, guard conditions, timers, clients, services, events.
 _ONE_CONDITION = (0, 1, 0, 0, 0, 0)
 
 _says_who: dict[str, bool] = {}
-#: By their ids, the nodes of publishers and listeners that had a name, the last to have it last. A
-#: participant that DDS had given up, as after a gap in the network, returns with its ids, and
-#: rmw_fastrtps does not get its nodes' names again.
+#: Node names by the id of a publisher or listener, the most recently confirmed last. If DDS drops
+#: a participant, for example during a network outage, it returns with the same ids, but
+#: rmw_fastrtps does not receive the names of its nodes again.
 _names: dict[bytes, str] = {}
-#: The only graph of rmw_zenoh's tokens, if they are used instead of rclpy.
+#: The graph from rmw_zenoh's liveliness tokens; empty if rclpy's graph is used.
 _tokens: list[RobotGraph] = []
 _changes: WeakKeyDictionary[Context, GraphChanges] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
 class GraphPublisher:
-    """One publisher of a topic.
+    """A publisher of a topic.
 
-    A publisher is discovered before its node's name is. Its id, type and QoS are right from the
-    start.
+    ROS discovers a publisher before the name of its node. Its id, type and QoS are correct from
+    the start.
     """
 
-    #: Its id, 16 bytes, equal to ``Received.gid`` of its messages.
+    #: The id, 16 bytes. It equals ``Received.gid`` of its messages if ``gid_identifies_node``.
     gid: bytes
-    #: The full name, such as ``/rover/static``; the former one if it had a name once.
-    #: ``UNKNOWN_NODE`` until it is discovered, and for good if it belongs to no ROS node, or
-    #: ``BARE_DDS`` if rmw recognises that.
+    #: The full name of the node, such as ``/rover/static``, or its last discovered name. Before
+    #: the discovery it is ``UNKNOWN_NODE``. A publisher without a ROS node stays ``UNKNOWN_NODE``,
+    #: or is ``BARE_DDS`` if the rmw recognises it.
     node: str
     durability: Literal["volatile", "transient_local"]
     reliability: Literal["reliable", "best_effort"]
-    #: Such as ``tf2_msgs/msg/TFMessage``.
+    #: The message type, such as ``tf2_msgs/msg/TFMessage``.
     type: str
 
 
 class GraphChanges:
     """Counts the changes of the graph that a node discovers.
 
-    rmw triggers one condition for all changes of a context, and a wait resets the trigger. Get a
-    context's counter from ``graph_changes``.
+    A context has a single guard condition for all changes, and waiting resets it. So only one
+    counter for a context works. Get it from ``graph_changes``.
     """
 
     def __init__(self, node: Node) -> None:
@@ -98,10 +98,10 @@ class GraphChanges:
         self._count = 0
 
     def count(self) -> int:
-        """Return how many times a change was found so far, without blocking."""
+        """Return the number of calls that found a change, including this one, without blocking."""
         self._wait_set.clear_entities()
         if _tokens or self._add(self._wait_set.pointer, self._condition, None):
-            self._count += 1  # nothing says whether it changed
+            self._count += 1  # changes cannot be detected, so assume one
             return self._count
         self._wait_set.wait(0)
         self._count += self._wait_set.is_ready("guard_condition", 0)
@@ -121,7 +121,7 @@ def writers(node: Node, topic: str) -> list[GraphPublisher]:
     A relative ``topic`` is resolved in the node's namespace, and the node's remappings apply.
     """
     if _tokens:
-        found = _tokens[0].publishers(node.resolve_topic_name(topic))
+        publishers = _tokens[0].publishers(node.resolve_topic_name(topic))
         return [
             GraphPublisher(
                 endpoint.gid,
@@ -130,18 +130,18 @@ def writers(node: Node, topic: str) -> list[GraphPublisher]:
                 endpoint.reliability,
                 endpoint.type,
             )
-            for endpoint in found
+            for endpoint in publishers
         ]
     return _sort_publishers(node.get_publishers_info_by_topic(topic))
 
 
 def publishing_nodes(node: Node, topic: str) -> list[str]:
-    """Return the names of the nodes that publish the topic, each once, sorted."""
+    """Return the names of the nodes that publish the topic, sorted, without duplicates."""
     return sorted({writer.node for writer in writers(node, topic)})
 
 
 def unmapped_writers(node: Node, topic: str) -> list[GraphPublisher]:
-    """Return the publishers of exactly this absolute topic, whatever the node's remappings are.
+    """Return the publishers of this absolute topic, without applying the node's remappings.
 
     The query uses the DDS name, ``rt/…``; an rmw without DDS returns none.
     """
@@ -154,21 +154,21 @@ def _sort_publishers(infos: Iterable[TopicEndpointInfo]) -> list[GraphPublisher]
 
 def volatile_readers(node: Node, topic: str) -> list[str]:
     """Return the other nodes that listen to the topic without requesting latched messages."""
-    own = own_name(node)
+    name = own_name(node)
     infos = node.get_subscriptions_info_by_topic(topic)
     volatile = [info for info in infos if info.qos_profile.durability == DurabilityPolicy.VOLATILE]
-    return sorted({_name_of(info) for info in volatile} - {own, UNKNOWN_NODE})
+    return sorted({_name_of(info) for info in volatile} - {name, UNKNOWN_NODE})
 
 
 def own_gid(node: Node, topic: str) -> bytes:
     """Return the id of the node's own subscription; empty if the graph lacks it."""
     infos = node.get_subscriptions_info_by_topic(topic)
-    own = (
+    endpoints = (
         info
         for info in infos
         if (info.node_name, info.node_namespace) == (node.get_name(), node.get_namespace())
     )
-    return next((bytes(info.endpoint_gid[:16]) for info in own), b"")
+    return next((bytes(info.endpoint_gid[:16]) for info in endpoints), b"")
 
 
 def _writer(info: TopicEndpointInfo) -> GraphPublisher:
@@ -184,11 +184,11 @@ def _writer(info: TopicEndpointInfo) -> GraphPublisher:
 
 
 def _name_of(info: TopicEndpointInfo) -> str:
-    """Return the full name of an endpoint's node, and remember it; unnamed: the last one."""
+    """Return the full name of an endpoint's node, or its last name if the rmw has none now."""
     gid, name = bytes(info.endpoint_gid[:16]), _full_name(info.node_namespace, info.node_name)
-    known = _names.pop(gid, name)
+    last_name = _names.pop(gid, name)
     if name in {UNKNOWN_NODE, BARE_DDS}:
-        name = known
+        name = last_name
     if name not in {UNKNOWN_NODE, BARE_DDS}:
         _names[gid] = name
         if len(_names) > MOST_NAMES:
@@ -204,7 +204,7 @@ def _full_name(namespace: str, name: str) -> str:
     return f"{namespace.rstrip('/')}/{name}"
 
 
-#: The services that a node has by itself.
+#: The services that rclpy and rclcpp create for every node.
 _OF_EACH_NODE = frozenset(
     {
         "describe_parameters",
@@ -225,10 +225,10 @@ def is_offered(node: Node, service: str) -> bool:
     """
     if not node.count_services(service):
         return False
-    found = node.get_subscriptions_info_by_topic(
+    servers = node.get_subscriptions_info_by_topic(
         f"rq{service}Request", no_mangle=True
     )  # its name in DDS
-    own = next(
+    own_gid = next(
         (
             writer.gid
             for writer in writers(node, "/parameter_events")
@@ -236,8 +236,8 @@ def is_offered(node: Node, service: str) -> bool:
         ),
         b"",
     )
-    return not found or not all(
-        has_ended(bytes(endpoint.endpoint_gid[:16]), own) for endpoint in found
+    return not servers or not all(
+        has_ended(bytes(endpoint.endpoint_gid[:16]), own_gid) for endpoint in servers
     )
 
 
@@ -264,25 +264,25 @@ def topics(node: Node) -> list[tuple[str, tuple[str, ...]]]:
 def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
     """Return the endpoints of a topic: node, type, and whether it publishes.
 
-    ``topic`` is a full name. Endpoints without a node name and the node's own are left out.
+    ``topic`` is a full name. Endpoints without a node name, and those of ``node``, are excluded.
     """
-    own = own_name(node)
+    name = own_name(node)
     infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
     infos += [(info, False) for info in node.get_subscriptions_info_by_topic(topic)]
     named = [(_name_of(info), info.topic_type, sends) for info, sends in infos]
-    return sorted({node for node in named if node[0] not in {own, UNKNOWN_NODE}})
+    return sorted({node for node in named if node[0] not in {name, UNKNOWN_NODE}})
 
 
 def nodes(node: Node) -> list[str]:
     """Return the full names of the other nodes that ``node`` has discovered, sorted."""
-    own = own_name(node)
+    name = own_name(node)
     names = {
         _full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()
     }
     names |= set(
         publishing_nodes(node, "/parameter_events")
-    )  # of each node, also one that returns
-    return sorted(names - {own, UNKNOWN_NODE, BARE_DDS})
+    )  # every node has this topic; these names include remembered ones
+    return sorted(names - {name, UNKNOWN_NODE, BARE_DDS})
 
 
 # Ids.
@@ -295,7 +295,7 @@ class Allocator(ctypes.Structure):
 
 
 class _Gid(ctypes.Structure):
-    """rmw_gid_t, with 16 bytes of storage since Iron, and spare room behind it."""
+    """rmw_gid_t, with 16 bytes of storage since Iron, and spare space after it."""
 
     _fields_ = (
         ("implementation", ctypes.c_char_p),
@@ -304,10 +304,10 @@ class _Gid(ctypes.Structure):
     )
 
 
-def ids_say_who(node: Node) -> bool:
-    """Return whether the id of a message equals that of its publisher in the graph.
+def gid_identifies_node(node: Node) -> bool:
+    """Return whether the id of a message equals the id of its publisher in the graph.
 
-    Tested once for each rmw.
+    The result for each rmw is cached.
     """
     rmw: str = get_rmw_implementation_identifier()
     if rmw.startswith("rmw_fastrtps"):
@@ -318,14 +318,14 @@ def ids_say_who(node: Node) -> bool:
 
 
 def _by_tokens(rmw: str) -> bool:
-    """Ask liveliness tokens if the rmw is Zenoh's and a router is there."""
+    """If the rmw is Zenoh's and has a router, use liveliness tokens and return True."""
     if (
         rmw != IMPLEMENTATIONS["zenoh"]
         or find_spec("zenoh") is None
         or find_spec("xxhash") is None
     ):
         return False
-    # Only for robots on Zenoh.
+    # Only robots on Zenoh need it.
     from tfcompose.tf.ros.zenoh_graph import RobotGraph  # noqa: PLC0415
 
     try:
@@ -337,7 +337,7 @@ def _by_tokens(rmw: str) -> bool:
 
 
 def gid_of(publisher: Any) -> bytes:
-    """Return the id, 16 bytes, in the messages of this publisher of one's own; empty: none."""
+    """Return the id (16 bytes) in messages of this process's publisher; empty if unknown."""
     library, gid = rcl(), _Gid()
     handle = library.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
     return (
@@ -351,9 +351,9 @@ def _ask(node: Node) -> bool:
     publisher = node.create_publisher(String, ASKING, 1)
     try:
         end = time.monotonic() + SHOWN_WITHIN_S
-        while not (shown := writers(node, ASKING)) and time.monotonic() < end:
+        while not (publishers := writers(node, ASKING)) and time.monotonic() < end:
             time.sleep(0.01)
-        return gid_of(publisher) in {endpoint.gid for endpoint in shown}
+        return gid_of(publisher) in {endpoint.gid for endpoint in publishers}
     finally:
         node.destroy_publisher(publisher)
 
@@ -362,7 +362,7 @@ def _ask(node: Node) -> bool:
 def rcl() -> ctypes.CDLL:
     """Return librcl, which rclpy has loaded, with its functions declared.
 
-    It also gives access to functions of rmw and rcutils.
+    It also provides functions of rmw and rcutils.
 
     Raises:
         RosError: if the library cannot be opened.

@@ -1,7 +1,7 @@
 """std_msgs/Header at the start of a message, read from its bytes, without ROS.
 
-After CDR's four bytes: int32 seconds, uint32 nanoseconds, and the frame as uint32 length, bytes
-and a NUL that the length counts.
+After CDR's four bytes come int32 seconds, uint32 nanoseconds, and the frame. The frame is a uint32
+length, the bytes and a NUL, which the length includes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _LONGEST = 1024
 
 
 def read_header(data: bytes) -> tuple[str, int] | None:
-    """Return a message's frame and stamp in nanoseconds, or None without a header."""
+    """Return a message's frame and stamp in nanoseconds, None without a header."""
     if len(data) < _NAME_AT or data[:2] not in {LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]}:
         return None
     seconds, nanoseconds, length = struct.unpack_from("<iII" if data[1] else ">iII", data, 4)

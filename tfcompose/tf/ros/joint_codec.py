@@ -1,9 +1,10 @@
-"""sensor_msgs/JointState as bytes, read and written in part, without ROS's typed messages.
+"""sensor_msgs/JointState as bytes, read and written in part, without ROS's message classes.
 
-Layout (OMG CDR; sizes count from the end of the four bytes of header): int32 seconds, uint32
-nanoseconds, the frame as uint32 length, bytes and a NUL that the length counts; uint32 number of
-names, each written like the frame; uint32 number of positions, padding to a multiple of 8, the
-doubles; velocities and efforts in the same form. Lengths are aligned to 4 bytes.
+Layout (OMG CDR, after a header of four bytes): int32 seconds; uint32 nanoseconds; the frame as a
+uint32 length, the bytes and a NUL, which the length includes; uint32 number of names, and each
+name like the frame; uint32 number of positions, and the positions as doubles; velocities and
+efforts like the positions. Lengths are aligned to 4 bytes and doubles to 8, counted from the end
+of the header.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ class JointNames:
     """The constant part of a sender's messages: the frame and the names, as sent."""
 
     names: tuple[str, ...]
-    #: The byte order, as struct's prefix.
+    #: The byte order as a prefix for struct.
     order: str
-    #: The bytes after the stamp, up to the number of positions.
+    #: The bytes from the frame to the last name, without the number of positions.
     raw: bytes
 
     def fit(self, data: bytes) -> bool:
         """Return whether the message has exactly these names.
 
-        In the other byte order its lengths read differently.
+        A message in the other byte order does not fit, because its lengths differ.
         """
         return data.startswith(self.raw, _FRAME_AT)
 
@@ -52,50 +53,54 @@ class JointNames:
         """Return the byte offset of the positions, as doubles, in a message with these names.
 
         Raises:
-            ValueError: if it has another number of positions; the same fault has the same
-                sentence.
+            ValueError: if it has a different number of positions. The text depends only on the
+                kind of fault, so that repeated faults can be reported once.
         """
-        at = _FRAME_AT + len(self.raw)
-        count = struct.unpack_from(f"{self.order}I", data, at)[0] if at + 4 <= len(data) else -1
+        offset = _FRAME_AT + len(self.raw)
+        count = (
+            struct.unpack_from(f"{self.order}I", data, offset)[0]
+            if offset + 4 <= len(data)
+            else -1
+        )
         if count != len(self.names):
             raise ValueError(
                 "it has names and no positions"
                 if count == 0
-                else "it has another number of positions than of names"
+                else "it has a different number of positions than of names"
             )
-        at += 4
-        at += (_HEADER - at) % _DOUBLE if count else 0
-        if at + count * _DOUBLE > len(data):
+        offset += 4
+        offset += (_HEADER - offset) % _DOUBLE if count else 0
+        if offset + count * _DOUBLE > len(data):
             raise ValueError("it ends inside its positions")
-        return at
+        return offset
 
 
 def read_names(data: bytes) -> JointNames:
-    """Return the names of a message. Work and memory are bounded by its length.
+    """Return the names of a message. Time and memory are bounded by the length of the data.
 
     Raises:
-        ValueError: if it is not a JointState; the same fault has the same sentence.
+        ValueError: if it is not a JointState. The text depends only on the kind of fault.
     """
     if data[:2] not in (LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]) or len(data) < _FRAME_AT:
-        raise ValueError("its bytes are not one")
+        raise ValueError("its bytes are not a JointState")
     order = "<" if data[1] else ">"
     try:
-        _, at = _text(data, _FRAME_AT, order)
-        count, at = _count(data, at, order)
+        _, offset = _text(data, _FRAME_AT, order)
+        count, offset = _count(data, offset, order)
         names = []
         for _ in range(count):
-            name, at = _text(data, at, order)
+            name, offset = _text(data, offset, order)
             names.append(name)
-        _, end = _count(data, at, order)
+        _, end = _count(data, offset, order)
     except (struct.error, UnicodeDecodeError, IndexError):
-        raise ValueError("its bytes are not one") from None
+        raise ValueError("its bytes are not a JointState") from None
     return JointNames(tuple(names), order, data[_FRAME_AT : end - 4])
 
 
 def encode_names(names: Sequence[str]) -> bytearray:
     """Return a message with these names and positions of 0, little-endian.
 
-    ``fill`` sets its values.
+    ``fill`` then sets the time and the positions.
     """
     out = bytearray(LITTLE_ENDIAN + bytes(_FRAME_AT - _HEADER))
     out += struct.pack("<I", 1) + b"\0"
@@ -122,14 +127,14 @@ def _append_number(out: bytearray, number: int) -> None:
     out += bytes(-len(out) % 4) + struct.pack("<I", number)
 
 
-def _count(data: bytes, at: int, order: str) -> tuple[int, int]:
-    at += -at % 4
-    return int(struct.unpack_from(f"{order}I", data, at)[0]), at + 4
+def _count(data: bytes, offset: int, order: str) -> tuple[int, int]:
+    offset += -offset % 4
+    return int(struct.unpack_from(f"{order}I", data, offset)[0]), offset + 4
 
 
-def _text(data: bytes, at: int, order: str) -> tuple[str, int]:
-    length, at = _count(data, at, order)
-    end = at + length
+def _text(data: bytes, offset: int, order: str) -> tuple[str, int]:
+    length, offset = _count(data, offset, order)
+    end = offset + length
     if end > len(data):
         raise IndexError
-    return data[at:end].removesuffix(b"\0").decode(), end
+    return data[offset:end].removesuffix(b"\0").decode(), end

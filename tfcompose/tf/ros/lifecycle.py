@@ -10,10 +10,10 @@ from lifecycle_msgs.srv import ChangeState, GetState
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-#: Maximum wait for an answer, and between two requests, in seconds.
+#: Maximum wait for an answer, and interval between requests, in seconds.
 ANSWER_S = 5.0
 ASK_EVERY_S = 0.2
-#: Time before a failed transition is tried again, in seconds.
+#: Time before a failed transition is retried, in seconds.
 TRY_AGAIN_S = 2.0
 
 _NAMES = {
@@ -30,9 +30,9 @@ _NEXT = {
 
 
 class Lifecycle:
-    """One node, and its target state.
+    """A node, and its target state.
 
-    Requests are sent and answers read by hand: nothing spins here.
+    Requests are sent and answers read directly, because nothing spins the node.
     """
 
     def __init__(self, node: Node, name: str, state: str, *, drive: bool) -> None:
@@ -59,11 +59,14 @@ class Lifecycle:
         return bool(self._state)
 
     def ask_again(self) -> None:
-        """Request the state again; a restarted node is driven again, a deactivated one is not."""
+        """Request the state again.
+
+        A restarted node is brought into its state again, a deactivated node is not.
+        """
         self._state, self._is_fresh = "", False
 
     def check(self, now: float) -> tuple[bool, str]:
-        """Read answers, send requests, and return whether the node is in its state."""
+        """Read answers, send requests, and return whether the node is in its target state."""
         self._take(now)
         if self._pending is None and self._state != self._wanted and now >= self._not_before:
             self._ask(now)
@@ -87,7 +90,7 @@ class Lifecycle:
         self._pending, self._requested_at = (client, sequence, what), now
 
     def _step(self) -> tuple[int, str] | None:
-        """Return the transition that is due: its number and name."""
+        """Return the next transition: its number and name, None without one."""
         self._is_fresh |= self._drive and self._state == "unconfigured"
         return _NEXT.get((self._state, self._wanted)) if self._is_fresh else None
 

@@ -1,7 +1,8 @@
-"""Detection of a network on this computer, and the wait for one.
+"""Detection of a network on this computer, and a wait for it.
 
-DDS reads a computer's addresses once, when a process joins. A process that joins without a
-network, as at boot before Wi-Fi is up, or with an unplugged cable, never reaches other computers.
+DDS reads a computer's addresses only when a process joins. Without a network at that time, the
+process never reaches other computers. This happens at boot before Wi-Fi is up, or with an
+unplugged cable.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.signals import Stop
 
-#: Period between two checks for a network, in seconds.
+#: Interval between checks for a network, in seconds.
 CHECK_EVERY_S = 0.5
 _FLAGS, _ADDRESS = 0x8913, 0x8915  # SIOCGIFFLAGS and SIOCGIFADDR of linux/sockios.h
 _LOOPBACK, _RUNNING = 0x8, 0x40  # IFF_LOOPBACK and IFF_RUNNING of linux/if.h
@@ -33,7 +34,7 @@ def has_network() -> bool:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         for _, name in socket.if_nameindex():
             request = _REQUEST.pack(name.encode(), 0)
-            with suppress(OSError):  # it has no address, or is gone
+            with suppress(OSError):  # no address, or removed
                 flags = _REQUEST.unpack(fcntl.ioctl(opened, _FLAGS, request))[1]
                 fcntl.ioctl(opened, _ADDRESS, request)
                 if flags & (_LOOPBACK | _RUNNING) == _RUNNING:
@@ -42,9 +43,9 @@ def has_network() -> bool:
 
 
 class FirstNetwork:
-    """Requests ``stop`` once there is a network, if there is none when the block begins.
+    """Requests ``stop`` when a network appears, if there is none at the start of the block.
 
-    ``came`` says that this happened. If ROS is limited to this computer, it waits for nothing.
+    ``came`` tells whether this has happened. If ROS is limited to this computer, nothing happens.
     """
 
     def __init__(self, stop: Stop) -> None:

@@ -1,8 +1,9 @@
-"""tfcompose's own node, with TF as bytes: publish, receive with the sender's id, wait.
+"""tfcompose's node, with TF as bytes: publish, receive with the sender's id, wait.
 
-The node is cheap: it has no executor, and no parameters, services or signal handlers of rclpy.
-rclpy on Jazzy does not say who published a message; rcl does (``rcl_take_serialized_message`` and
-rmw's ``rmw_message_info_t``), and is called here with ctypes.
+The node is cheap. It has no executor, and none of rclpy's parameters, services and signal
+handlers. rclpy on Jazzy does not report who published a message, but rcl does
+(``rcl_take_serialized_message`` and rmw's ``rmw_message_info_t``). This module calls rcl with
+ctypes.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from __future__ import annotations
 import ctypes
 import faulthandler
 import os
+import threading
 import weakref
 from abc import ABC, abstractmethod
-from contextlib import contextmanager
+from collections import deque
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -30,7 +33,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
 from tfcompose.tf.ros.environment import RosError
-from tfcompose.tf.ros.graph import Allocator, gid_of, ids_say_who, rcl
+from tfcompose.tf.ros.graph import Allocator, gid_identifies_node, gid_of, rcl
 from tfcompose.tf.ros.sockets import widen_buffers
 from tfcompose.tf.ros.typesupport import capsule_address, tf_message_type
 
@@ -41,8 +44,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bool, float)
 
-#: Time limit for closing a node, in seconds: long enough on a busy machine, and shorter than the
-#: time from SIGINT to SIGTERM.
+#: Time limit for closing a node, in seconds. It suffices on a busy machine, and is shorter than
+#: the time from SIGINT to SIGTERM.
 LEAVE_S = 3.0
 
 _OK = 0
@@ -68,7 +71,7 @@ def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy
 def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> QoSProfile:
     """Return the given profile, or the default.
 
-    A depth replaces only the default's depth, so that latched stays latched.
+    A depth replaces only the default's depth, so that a latched profile stays latched.
     """
     if isinstance(qos_or_depth, int):
         profile: Any = default
@@ -76,17 +79,18 @@ def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> Qo
     return qos_or_depth or default
 
 
-#: tf2_ros ``qos.hpp`` (Jazzy): what every listener and broadcaster of TF expects of the other.
+#: tf2_ros ``qos.hpp`` (Jazzy): the QoS that TF's listeners and broadcasters expect of each other.
 TF_PUBLISHER = TF_READER = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 TF_STATIC_PUBLISHER = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 TF_STATIC_READER = qos(100, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
-#: Number of messages that a deep reader keeps until they are taken; beyond it, the oldest are
+#: Number of messages that a deep reader keeps until they are taken. Beyond it, the oldest are
 #: lost.
 DEEP = 1000
 DEEP_TF_READER = qos(DEEP, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 DEEP_TF_STATIC_READER = qos(DEEP, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
-#: Matches any publisher of ``joint_states``, as robot_state_publisher's subscription does; that
-#: one keeps 5 messages, and loses those of a fast source while it does not run for a moment.
+#: Matches any publisher of ``joint_states``, like the subscription of robot_state_publisher. That
+#: subscription keeps only 5 messages, and loses messages of a fast source if it is suspended for a
+#: moment.
 JOINT_STATES = qos(50, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
 #: A value for late joiners, such as ``robot_description``.
 LATCHED = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
@@ -94,15 +98,15 @@ LATCHED = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 
 @contextmanager
 def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterator[Node]:
-    """Give a node in its own context, and end both with the ``with`` block.
+    """Yield a node in its own context, and end both after the ``with`` block.
 
-    Leaving takes some milliseconds; if ROS does not return, the process is ended after
-    ``LEAVE_S``. The node offers no parameters, no services and no /rosout, since nothing here
-    would answer them. ``args`` are the arguments after ``--ros-args``, for example ``["-r",
-    "/tf:=tf"]``; the process's own arguments are ignored.
+    Leaving takes some milliseconds. If ROS does not return, the process is ended after
+    ``LEAVE_S``. The node offers no parameters, no services and no /rosout, because nothing here
+    would answer requests. ``args`` are the arguments after ``--ros-args``, for example ``["-r",
+    "/tf:=tf"]``. The process's own arguments are ignored.
 
     Raises:
-        RosError: if ROS refuses the name, the arguments or its environment.
+        RosError: if ROS rejects the name, the arguments or its environment.
     """
     context = Context()
     try:
@@ -128,10 +132,11 @@ def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterato
 def end_unless_done(seconds: float) -> Iterator[None]:
     """End this process with code 1 if the block takes longer than ``seconds``.
 
-    Fast DDS 2.14 can deadlock when several processes leave at once (one time in a hundred, seen on
-    Jazzy): the leaving participant waits, at full load, for a listener that handles the departure
-    of a publisher, and that listener waits for the participant. A Python thread could not end the
-    process, because ROS holds the interpreter's lock while it leaves; faulthandler's thread can.
+    Fast DDS 2.14 can deadlock when several processes leave at once (one in a hundred times,
+    observed on Jazzy). The leaving participant busy-waits for a listener that handles the
+    departure of a publisher, and that listener waits for the participant. A Python thread could
+    not end the process, because ROS holds the interpreter's lock while it leaves. faulthandler's
+    thread can.
     """
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
@@ -154,7 +159,7 @@ def _node(context: Context, name: str, namespace: str) -> Any:
 
 
 def load_types() -> None:
-    """Load the message types of every own process, as their first publisher would."""
+    """Load the message types of every tfcompose process, as the first publisher would."""
     tf_message_type()
     load: Any = check_for_type_support  # rclpy does not say the types of its arguments
     for message in (String, ParameterEvent):
@@ -170,8 +175,13 @@ def middleware() -> str:
 def latch(node: Node, topic: str, text: str) -> Any:
     """Publish ``text`` latched as std_msgs/String while the returned publisher lives."""
     publisher = node.create_publisher(String, topic, LATCHED)
-    publisher.publish(String(data=text))
+    send_text(publisher, text)
     return publisher
+
+
+def send_text(publisher: Any, text: str) -> None:
+    """Publish ``text`` with a publisher of ``latch``, in place of the text before."""
+    publisher.publish(String(data=text))
 
 
 def parameter(node: Node, name: str, default: T) -> T:
@@ -220,24 +230,25 @@ class _MessageInfo(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A message as bytes, and its origin. Times are in nanoseconds of the system clock."""
+    """A message as bytes, with its origin. Times are in nanoseconds of the system clock."""
 
     data: bytes
-    #: Its publisher's id, 16 bytes, as in ``graph.writers``; None: the rmw does not identify
+    #: Its publisher's id, 16 bytes, as in ``graph.writers``; None if the rmw does not identify
     #: senders.
     gid: bytes | None
     source_ns: int
     received_ns: int
-    #: Count of the publisher's messages; the largest uint64 if the rmw does not count.
+    #: Number of the message among its publisher's messages; the largest uint64 if the rmw does not
+    #: count.
     sequence: int
-    #: The id as the rmw gives it: it distinguishes senders, and one's own publishers from others.
+    #: The id from the rmw, which distinguishes senders, and this process's publishers from others.
     raw_gid: bytes | None = None
 
 
 class TFPublisher:
-    """A publisher of TFMessage bytes on /tf or, latched, on /tf_static, or on another ``topic``.
+    """A publisher of TFMessage bytes on /tf, latched on /tf_static, or on another ``topic``.
 
-    ``qos`` is rclpy's profile, a depth, or None for tf2's.
+    ``qos`` is an rclpy profile, a depth, or None for tf2's profile.
     """
 
     def __init__(
@@ -263,11 +274,19 @@ class TFPublisher:
         self.publisher.publish(data)
 
 
-class MessageSource(ABC):
+class WaitSource(ABC):
+    """Something to wait for with ``wait``."""
+
+    @abstractmethod
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Add it to rclpy's wait set; return the kind and index of its entity there."""
+
+
+class MessageSource(WaitSource):
     """A source of a topic's messages as bytes, for use with ``wait``."""
 
-    def __init__(self, topic: str, *, says_who: bool) -> None:
-        self._topic, self._says_who = topic, says_who
+    def __init__(self, topic: str, *, gid_identifies_node: bool) -> None:
+        self._topic, self._says_who = topic, gid_identifies_node
         library = rcl()
         self._bytes = _Bytes(allocator=library.rcutils_get_default_allocator())
         self._info = _MessageInfo()
@@ -281,23 +300,20 @@ class MessageSource(ABC):
     def take(self) -> list[Received]:
         """Return the messages received since the last call, oldest first, without blocking.
 
-        At most ``DEEP`` messages, so that a flood does not keep the caller from handling signals.
+        At most ``DEEP`` messages are returned, so that the caller can handle signals during a
+        flood.
 
         Raises:
             RosError: if rcl cannot take from this subscription.
         """
-        found: list[Received] = []
-        while len(found) < DEEP and self._take_one():
-            found.append(self._receive())
-        return found
+        received: list[Received] = []
+        while len(received) < DEEP and self._take_one():
+            received.append(self._receive())
+        return received
 
     @abstractmethod
     def _take_one(self) -> bool:
         """Take a message into the buffer, and return whether there was one."""
-
-    @abstractmethod
-    def add_to(self, wait_set: Any) -> tuple[str, int]:
-        """Add it to rclpy's wait set; return the kind and index of its entity there."""
 
     def _receive(self) -> Received:
         info = self._info
@@ -319,7 +335,9 @@ class Subscription(MessageSource):
         self.subscription: Any = node.create_subscription(
             message_type, topic, _ignore, qos, raw=True
         )
-        super().__init__(self.subscription.topic_name, says_who=ids_say_who(node))
+        super().__init__(
+            self.subscription.topic_name, gid_identifies_node=gid_identifies_node(node)
+        )
         self._take = rcl().rcl_take_serialized_message
         self._arguments = (
             ctypes.c_void_p(self.subscription.handle.pointer),
@@ -341,10 +359,10 @@ class Subscription(MessageSource):
 
 
 class TFSubscription(Subscription):
-    """A subscription to /tf, /tf_static or ``topic`` with a tf2 listener's QoS.
+    """A subscription to /tf, /tf_static or ``topic`` with the QoS of a tf2 listener.
 
-    ``deep`` keeps ten times as many messages as listeners do, for a subscriber that must miss no
-    publisher: among a hundred latched ones discovered at once, or in a flood.
+    ``deep`` keeps ten times as many messages as listeners do. It is for a subscriber that must
+    miss no publisher, even in a flood or if a hundred latched publishers are discovered at once.
     """
 
     def __init__(
@@ -394,17 +412,19 @@ class PublicTFReader(MessageSource):
 
     Fast DDS selects profiles of readers by ROS topic name. This reader has the same DDS topic
     without a ROS name. rmw creates it directly, because rcl accepts only names that begin with a
-    slash. It receives through its own port if possible, so that a flood there drops nothing of
-    what the process's other readers receive. It keeps as many messages as a deep
-    ``TFSubscription``. Call ``close`` before the node ends.
+    slash. If possible, it receives through its own port, so that a flood there drops no messages
+    of the process's other readers. It keeps as many messages as a deep ``TFSubscription``. Call
+    ``close`` before the node ends.
 
     Raises:
-        RosError: if rmw makes no such reader, or does not report arrivals.
+        RosError: if rmw cannot create such a reader, or does not report arrivals.
     """
 
     def __init__(self, node: Node, topic: str, *, static: bool) -> None:
         library = rcl()
-        super().__init__(node.resolve_topic_name(topic), says_who=ids_say_who(node))
+        super().__init__(
+            node.resolve_topic_name(topic), gid_identifies_node=gid_identifies_node(node)
+        )
         profile = DEEP_TF_STATIC_READER if static else DEEP_TF_READER
         numbers = (
             int(profile.history),
@@ -457,19 +477,47 @@ class PublicTFReader(MessageSource):
         return result == _OK and self._taken.value
 
 
+class PipeReader(WaitSource):
+    """Lines from a pipe, for use with ``wait``. A thread reads them, until the other end closes.
+
+    The reader takes over the descriptor.
+    """
+
+    def __init__(self, node: Node, fd: int) -> None:
+        self._lines: deque[bytes] = deque()
+        self._came = _rclpy.GuardCondition(node.context.handle)
+        threading.Thread(target=self._read, args=(fd,), name="orders", daemon=True).start()
+
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Add it to rclpy's wait set; return the kind and index of its entity there."""
+        return "guard_condition", wait_set.add_guard_condition(self._came)
+
+    def take_lines(self) -> Iterator[bytes]:
+        """Yield the lines received since the last call, oldest first, without blocking."""
+        while self._lines:
+            yield self._lines.popleft()
+
+    def _read(self, fd: int) -> None:
+        with os.fdopen(fd, "rb") as pipe:
+            for line in pipe:
+                self._lines.append(line)
+                with suppress(RuntimeError):  # ROS has shut down
+                    self._came.trigger_guard_condition()
+
+
 class WaitSet:
     """Readers to wait for repeatedly, until ``stop`` is requested."""
 
-    def __init__(self, node: Node, readers: Sequence[MessageSource], stop: Stop) -> None:
+    def __init__(self, node: Node, readers: Sequence[WaitSource], stop: Stop) -> None:
         self._readers, self._stop = tuple(readers), stop
         self._context = node.context.handle
         self._wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, self._context)
 
-    def wait(self, timeout_s: float | None) -> list[MessageSource]:
+    def wait(self, timeout_s: float | None) -> list[WaitSource]:
         """Wait for a message, for ``timeout_s`` seconds (None: forever) or until ``stop``.
 
-        Return the readers with messages. A new publisher or reader in the graph does not end the
-        wait. Takes no message.
+        Return the readers with messages, without taking any message. A new publisher or reader in
+        the graph does not end the wait.
         """
         if self._stop.requested:
             return []
@@ -483,9 +531,7 @@ class WaitSet:
         return [reader for reader, kind, index in awaited if wait_set.is_ready(kind, index)]
 
 
-def wait(
-    node: Node, readers: Sequence[MessageSource], timeout_s: float | None, stop: Stop
-) -> None:
+def wait(node: Node, readers: Sequence[WaitSource], timeout_s: float | None, stop: Stop) -> None:
     """Wait once, as ``WaitSet.wait`` does."""
     WaitSet(node, readers, stop).wait(timeout_s)
 
@@ -495,7 +541,7 @@ def _topic(*, static: bool) -> str:
 
 
 def _ignore(_: object) -> None:
-    """Stand in for the callback that rclpy requires."""
+    """Do nothing, as the callback that rclpy requires."""
 
 
 class TextSubscription(Subscription):

@@ -1,6 +1,6 @@
-"""Read-only parameters of tfcompose's own node, for ``ros2 param``.
+"""Read-only parameters of tfcompose's node, for ``ros2 param``.
 
-rclpy answers its parameter services in an executor, which ``open_node`` does without.
+rclpy answers its parameter services in an executor, which a node from ``open_node`` does not have.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _REASON = "parameters of tfcompose's nodes are read-only: change the robot file"
 class ParameterServer:
     """The six standard parameter services of a node, answered by ``check``.
 
-    ``descriptions`` has the text of each parameter that the node does not declare itself.
+    ``descriptions`` has the description of each parameter that the node does not declare itself.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class ParameterServer:
         self._services: list[Any] = [each for each in node.services if each not in earlier]
 
     def check(self) -> None:
-        """Answer the requests that have come, without blocking."""
+        """Answer received requests without blocking."""
         for service in self._services:
             self._answer(service)
 

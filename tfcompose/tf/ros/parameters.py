@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-#: Maximum wait for an answer, in seconds; then the request is repeated.
+#: Maximum wait for an answer in seconds, before the request is repeated.
 ANSWER_S = 10.0
 
 Value = bool | int | float | str
@@ -26,9 +26,9 @@ _FIELDS = {
 
 
 class ParameterReader:
-    """Some parameters of one node.
+    """Reads some parameters of a node.
 
-    Requests are sent and answers read by hand: nothing spins here.
+    Requests are sent and answers read directly, because nothing spins the node.
     """
 
     def __init__(self, node: Node, name: str, parameters: Sequence[str]) -> None:
@@ -56,10 +56,10 @@ class ParameterReader:
             self._sequence, self._requested_at = self._client.handle.send_request(request), now
 
     def take(self) -> dict[str, Value | None] | None:
-        """Return the values if the answer has come, else None.
+        """Return the values if the answer has arrived, otherwise None.
 
-        A parameter that the node does not declare is None, and so is one that is neither a bool
-        nor a number nor a string.
+        The value is None for a parameter that the node does not declare, or that is not a bool, a
+        number or a string.
         """
         if self._sequence is None:
             return None
@@ -68,15 +68,15 @@ class ParameterReader:
         if header is None or header.request_id.sequence_number != self._sequence:
             return None
         self._sequence = None
-        # rclcpp answers nothing at all where it does not have one of them.
-        found = dict.fromkeys(self._parameters)
-        return found | {
+        # If one of the parameters does not exist, rclcpp's answer is empty.
+        values = dict.fromkeys(self._parameters)
+        return values | {
             name: _value(parameter)
             for name, parameter in zip(self._parameters, response.values, strict=False)
         }
 
 
-def _value(found: Any) -> Value | None:
-    field = _FIELDS.get(found.type)
-    value: Value | None = getattr(found, field) if field else None
+def _value(message: Any) -> Value | None:
+    field = _FIELDS.get(message.type)
+    value: Value | None = getattr(message, field) if field else None
     return value

@@ -1,8 +1,8 @@
 """Processes of this machine that have ROS loaded, and the process behind a publisher's id.
 
 With Fast DDS an id begins with the vendor's number (01 0f), two bytes for the host, and the lower
-half of the process id (``GuidUtils``, Fast DDS 2.14). Two machines can have the same two bytes, so
-a process is named only if exactly one matches. Other users' processes, and systems other than
+half of the process id (``GuidUtils``, Fast DDS 2.14). Two machines can have the same two bytes. So
+a process is named only if exactly one matches. Processes of other users, and systems other than
 Linux, cannot be inspected. This module imports no ROS.
 """
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 _LIBRARY = "librcl.so"
-#: Every middleware has threads. A process that has only loaded ROS, as a launcher for those that
-#: it forks, has its own, and two of LTTng's.
+#: Minimum number of threads of a process that uses a middleware. A process that has only loaded
+#: ROS, such as a launcher that forks other processes, has its own thread and two threads of LTTng.
 _FEWEST_THREADS = 4
 _PREFIXES = ("ROS_", "RMW_")
-#: Maximum number of characters shown of a command line.
+#: Maximum number of characters of a command line to display.
 _SHOWN = 100
 _VENDOR = b"\x01\x0f"
 _WORD = 1 << 16
@@ -41,7 +41,7 @@ def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
                 ros_variables(procfs.environ(pid)),
                 _show_command(procfs.argv(pid)),
             )
-        except OSError:  # another user's, or it has just ended
+        except OSError:  # another user's process, or it has just ended
             continue
         yield pid, command, variables
 
@@ -52,7 +52,7 @@ def ros_variables(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def origin(gid: bytes, own_gid: bytes) -> str:
-    """Return where a publisher runs: ``on this machine as pid 7: …``, ``on another machine``.
+    """Return where a publisher runs: "on this machine as pid 7: …", "on another machine".
 
     Empty if unknown. ``own_gid`` is an id of this process.
     """
@@ -70,9 +70,9 @@ def origin(gid: bytes, own_gid: bytes) -> str:
 def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
     """Return the initial environments of the processes that may own the publisher.
 
-    There are several if more processes match the id's half of a process id, and none if it runs on
-    another machine or has ended. None: unknown, because the id is another vendor's, or a process
-    another user's.
+    There are several if more processes match the id's half of a process id, and none if the
+    publisher runs on another machine or has ended. None if unknown, because the id has another
+    vendor's format or a process belongs to another user.
     """
     if not _is_known(gid, own_gid):
         return None
@@ -87,7 +87,7 @@ def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
 def descent(gid: bytes, own_gid: bytes, ancestor: int) -> tuple[int, ...]:
     """Return a publisher's process and its ancestors, up to the child of ``ancestor``.
 
-    Empty if it does not descend from that process, or is unknown.
+    Empty if the process is unknown or is not a descendant of ``ancestor``.
     """
     if not _is_known(gid, own_gid) or gid[2:4] != own_gid[2:4]:
         return ()
@@ -126,7 +126,7 @@ def _environment(pid: int) -> dict[str, str]:
     """Return the environment of a process; empty if it has just ended.
 
     Raises:
-        PermissionError: if it is another user's.
+        PermissionError: if it belongs to another user.
     """
     try:
         return procfs.environ(pid)

@@ -1,6 +1,6 @@
-"""``rclpy.time`` and ``rclpy.duration``, which tf2_ros loads.
+"""Imports of ``rclpy.time`` and ``rclpy.duration``, which tf2_ros also imports.
 
-Programs rely on that: they use ``rclpy.time.Time`` after ``import rclpy`` alone.
+Programs rely on this, because they use ``rclpy.time.Time`` after only ``import rclpy``.
 """
 
 import rclpy.duration

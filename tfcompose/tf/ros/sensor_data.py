@@ -1,6 +1,7 @@
 """Sensor topics: joint states in the node's namespace, and headers of messages.
 
-Messages are bytes; ``joint_codec`` reads and writes joint states, ``header_codec`` reads headers.
+Messages are bytes. ``joint_codec`` reads and writes joint states, and ``header_codec`` reads
+headers.
 """
 
 from __future__ import annotations
@@ -52,17 +53,17 @@ class JointStatePublisher:
         return gid_of(self._publisher)
 
     def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
-        """Publish the positions, in the names' order, stamped with this time in nanoseconds."""
+        """Publish the positions in the order of the names, with a stamp in nanoseconds."""
         fill(self._message, stamp_ns, positions)
         self._publisher.publish(bytes(self._message))
 
     def close(self) -> None:
-        """Leave the topic before the node does."""
+        """Destroy the publisher before the node ends."""
         self._node.destroy_publisher(self._publisher)
 
 
-#: Messages that have a header, and are looked up in TF. Images are left out: their CameraInfo has
-#: the same header.
+#: Types of messages with a header whose frame is looked up in TF. Images are excluded, because
+#: their CameraInfo has the same header.
 HEADED = (
     "sensor_msgs/msg/LaserScan",
     "sensor_msgs/msg/PointCloud2",
@@ -74,9 +75,10 @@ HEADED = (
 
 
 class HeaderSubscription(Subscription):
-    """A subscription to a topic of a type in ``HEADED``, or one that begins with a header.
+    """A subscription whose messages begin with a header.
 
-    It matches any publisher, and keeps the last ``depth`` messages until they are taken.
+    The topic has a type in ``HEADED``, or another type that begins with a header. The subscription
+    matches any publisher, and keeps the last ``depth`` messages until they are taken.
 
     Raises:
         ImportError: if the type is not installed.
@@ -91,11 +93,11 @@ class HeaderSubscription(Subscription):
     def take_headers(self) -> list[tuple[str, int, int]]:
         """Return frame, stamp and arrival in nanoseconds of each received message.
 
-        Skips messages without a header.
+        Messages without a header are skipped.
         """
-        found = []
+        headers = []
         for received in self.take():
             header = read_header(received.data)
             if header is not None:
-                found.append((*header, received.received_ns))
-        return found
+                headers.append((*header, received.received_ns))
+        return headers

@@ -13,13 +13,14 @@ from tfcompose.tf.ros.graph import is_offered
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-#: The field and the type of a parameter's value, by the type of it, or of what is in the list.
+#: The field of ParameterValue for a single value, and its type number, by the value's Python type.
 _SINGLE = {
     bool: ("bool_value", ParameterType.PARAMETER_BOOL),
     int: ("integer_value", ParameterType.PARAMETER_INTEGER),
     float: ("double_value", ParameterType.PARAMETER_DOUBLE),
     str: ("string_value", ParameterType.PARAMETER_STRING),
 }
+#: The same for a list, by the Python type of its items.
 _LISTS = {
     bool: ("bool_array_value", ParameterType.PARAMETER_BOOL_ARRAY),
     int: ("integer_array_value", ParameterType.PARAMETER_INTEGER_ARRAY),
@@ -29,10 +30,10 @@ _LISTS = {
 
 
 def parameter(name: str, value: Any) -> Any:
-    """Return a parameter as a message; integers in a list with floats become floats.
+    """Return a parameter as a message. Integers in a list with floats become floats.
 
     Raises:
-        ValueError: if ROS has no parameter of that kind.
+        ValueError: if ROS has no parameter of this type.
     """
     value = ros_value(value)
     kinds = {type(item) for item in value} if isinstance(value, list) else {type(value)}
@@ -45,9 +46,9 @@ def parameter(name: str, value: Any) -> Any:
 
 
 class Service:
-    """One service of another process.
+    """A service of another process.
 
-    Requests are sent and answers read by hand: nothing spins here.
+    Requests are sent and answers read directly, because nothing spins the node.
     """
 
     def __init__(self, node: Node, kind: Any, name: str) -> None:
@@ -72,7 +73,7 @@ class Service:
             self._sequence = self._client.handle.send_request(request)
 
     def answer(self) -> Any:
-        """Return the answer to the last request if it has come, else None."""
+        """Return the answer to the last request if it has arrived, otherwise None."""
         while self._sequence is not None:
             with self._client.handle:
                 header, response = self._client.handle.take_response(
@@ -87,7 +88,7 @@ class Service:
 
 
 class ParameterWriter:
-    """One parameter of another node, set while it runs."""
+    """Sets a parameter of another node while the node runs."""
 
     def __init__(self, node: Node, name: str, key: str, value: Any) -> None:
         self._service = Service(node, SetParameters, f"{name}/set_parameters")
@@ -99,9 +100,11 @@ class ParameterWriter:
         self._service.close()
 
     def refusal(self) -> str | None:
-        """Send the value once the node is present.
+        """Send the value once the node is present, and read the node's answer.
 
-        Return why the node refused it; empty: it accepted; None: no answer yet.
+        The call does not wait: call it repeatedly until it returns a text. The text says why the
+        node rejected the value, and is empty if the node accepted it. Until the answer has come,
+        the result is None.
         """
         if not self._is_sent and self._service.is_there:
             self._service.ask(parameters=[self._parameter])

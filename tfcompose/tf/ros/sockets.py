@@ -1,7 +1,7 @@
-"""The UDP sockets that this process receives through: buffer sizes and lost datagrams.
+"""The UDP sockets through which this process receives: buffer sizes and lost datagrams.
 
-The middleware opens them, and reports neither. The kernel drops datagrams that arrive while a
-socket's buffer is full. If publishers send at the same moment, it drops the last ones, and a
+The middleware opens the sockets, and reports neither value. The kernel drops datagrams that arrive
+while a socket's buffer is full. If publishers send at the same moment, it drops the last ones. A
 reliable connection repeats them only with the writer's next heartbeat, 3 s later in Fast DDS.
 """
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Requested receive buffer of each socket, in bytes; the kernel grants at most ``LIMIT``.
 WANTED = 16 * 1024 * 1024
-#: The kernel's limit, as sysctl names it.
+#: The name of the kernel's limit in sysctl.
 LIMIT = "net.core.rmem_max"
 _MEMORY = struct.Struct("=9I")  # SK_MEMINFO_VARS of linux/sock_diag.h: the last one counts drops
 _SO_MEMINFO = 55  # asm-generic/socket.h
@@ -29,7 +29,7 @@ _INTERNET = (socket.AF_INET, socket.AF_INET6)
 
 
 def widen_buffers() -> None:
-    """Let each socket buffer ``WANTED`` bytes, or as many as the kernel grants."""
+    """Set each socket's buffer to ``WANTED`` bytes, or to as many as the kernel grants."""
     for udp_socket in _udp_sockets():
         with suppress(OSError):
             if udp_socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) < WANTED:
@@ -37,7 +37,7 @@ def widen_buffers() -> None:
 
 
 def buffer_limit() -> int | None:
-    """Return how many bytes the kernel grants a socket; None: unknown."""
+    """Return the number of bytes that the kernel grants a socket, None if unknown."""
     return procfs.kernel_number(LIMIT)
 
 
@@ -48,23 +48,23 @@ class LostDatagrams:
         self._known = _drops()
 
     def take(self) -> int:
-        """Return how many were lost since the last call."""
+        """Return the number of datagrams lost since the last call."""
         before, self._known = self._known, _drops()
         return sum(max(0, drops - before.get(inode, 0)) for inode, drops in self._known.items())
 
 
 def _drops() -> dict[int, int]:
-    """Return how many datagrams each socket lost, by inode."""
-    found = {}
+    """Return the number of datagrams that each socket has lost, by inode."""
+    drops = {}
     for udp_socket in _udp_sockets():
-        with suppress(OSError):  # a kernel that does not count
+        with suppress(OSError):  # the kernel does not count them
             numbers = udp_socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMORY.size)
-            found[os.fstat(udp_socket.fileno()).st_ino] = _MEMORY.unpack(numbers)[-1]
-    return found
+            drops[os.fstat(udp_socket.fileno()).st_ino] = _MEMORY.unpack(numbers)[-1]
+    return drops
 
 
 def _udp_sockets() -> Iterator[socket.socket]:
-    """Yield this process's UDP sockets, each as a duplicate that is open during the iteration."""
+    """Yield this process's UDP sockets as duplicates that stay open during the iteration."""
     for descriptor in procfs.descriptors():
         with suppress(OSError):  # closed meanwhile
             if not stat.S_ISSOCK(os.fstat(descriptor).st_mode):

@@ -39,7 +39,7 @@ class LookupAction:
         self.client = client(node, LookupTransform, action_name=name)
 
     def goal(self, target: str, source: str, source_ns: int, timeout_ns: int) -> Any:
-        """Return the goal for the source's pose in the target at one time, in nanoseconds."""
+        """Return the goal for the source's pose in the target at the same time, in nanoseconds."""
         goal = self._type.Goal()
         goal.target_frame, goal.source_frame, goal.advanced = target, source, False
         goal.source_time.sec, goal.source_time.nanosec = divmod(source_ns, _SECOND_NS)
@@ -48,12 +48,12 @@ class LookupAction:
 
     @staticmethod
     def set_fixed_frame(goal: Any, fixed: str, target_ns: int) -> None:
-        """Make the goal ask for the target at another time, through a fixed frame."""
+        """Make the goal request the target at another time, through a fixed frame."""
         goal.fixed_frame, goal.advanced = fixed, True
         goal.target_time.sec, goal.target_time.nanosec = divmod(target_ns, _SECOND_NS)
 
     def result(self, goal: Any, timeout_s: float) -> Any:
-        """Return the server's result, or as a string why none came in time.
+        """Return the server's result, or the reason as a string if there was none in time.
 
         Another thread must spin the node.
         """

@@ -1,13 +1,14 @@
 """TFMessage as bytes (OMG CDR), written and read without ROS.
 
-Layout; sizes count from the end of the four bytes of header: uint32 number of transforms; each one
-int32 seconds, uint32 nanoseconds, the parent and the child as uint32 length, bytes and a NUL that
-the length counts, then padding to a multiple of 8 and seven doubles: x y z in metres, the
-quaternion x y z w. The next one starts at a multiple of 4.
+Layout, with sizes counted from the end of the header of four bytes: uint32 number of transforms;
+then for each transform int32 seconds, uint32 nanoseconds, and the parent and the child, each as
+uint32 length, bytes and a NUL, which the length includes; then padding to a multiple of 8; then
+seven doubles: x y z in metres, the quaternion x y z w. The next transform starts at a multiple of
+4.
 
-``encode`` and ``decode`` handle any message. A publisher's messages usually differ only in stamps
+``encode`` and ``decode`` handle any message. Usually a publisher's messages differ only in stamps
 and poses. A ``Template``, or with numpy an ``ArrayTemplate``, is such a message to send
-repeatedly, and a ``Decoder`` reads further messages of a known layout in a twentieth of the time.
+repeatedly. A ``Decoder`` reads further messages of a known layout in a twentieth of the time.
 """
 
 from __future__ import annotations
@@ -29,15 +30,14 @@ if TYPE_CHECKING:
     Order = Literal["little", "big"]
 
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
-#: REP 2011's hash of its definition, and of what it is made of.
+#: REP 2011's hash of its definition, including the types that it contains.
 TF_MESSAGE_HASH = "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"
 
-#: The header; what follows its first two bytes is not looked at.
+#: The header. Only its first two bytes matter.
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 
-#: One transform as it was sent: parent, child, seconds, nanoseconds, x y z in metres, quaternion x
-#: y z w.
+#: A transform as sent: parent, child, seconds, nanoseconds, x y z in metres, quaternion x y z w.
 Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
 
 _HEADER = 4
@@ -45,30 +45,31 @@ _SECOND_NS = 1_000_000_000
 _POSE = struct.Struct("<7d")
 _STAMP = 8
 _IDENTITY = _POSE.pack(*Pose().xyz, *Pose().quat_xyzw)
-# Stamp, two empty names of 5 bytes, 56 bytes of doubles, and no padding: no transform is shorter.
+# Size of the shortest transform: stamp, two empty names of 5 bytes, 56 bytes of doubles, no
+# padding.
 _SHORTEST = 8 + 5 + 5 + 56
 # Offset of the first transform's parent: after the header, the number of transforms and a stamp.
 _FIRST_PARENT = 16
-# Limits of remembered layouts: the total size of their messages, and the number for one length and
-# beginning.
+# Limits for remembered layouts: the total size of their messages, and the number for the same
+# length and beginning.
 _MOST_BYTES = 1 << 22
 _MOST_ALIKE = 8
 # Size of a name's prefix, and the handler for bytes in it that are not UTF-8.
 _LENGTH = 4
 _REPLACED = "\ufffd"
-#: The longest name that is shown; no planned frame's is that long.
+#: Maximum length of a displayed name. Planned frames have shorter names.
 LONGEST_NAME = 1024
 
 
 @dataclass(frozen=True, slots=True)
 class SentTransform:
-    """One transform of a TFMessage, as it was sent: nothing is normalised."""
+    """A transform of a TFMessage as sent, without normalisation."""
 
-    #: In nanoseconds since the epoch.
+    #: Stamp in nanoseconds since the epoch.
     stamp_ns: int
     parent: str
     child: str
-    #: In metres.
+    #: Translation in metres.
     xyz: Vector
     quat_xyzw: Quaternion
 
@@ -77,7 +78,7 @@ class SentTransform:
 
 
 def encode(transforms: Sequence[SentTransform]) -> bytes:
-    """Return the transforms as one TFMessage, including the header.
+    """Return the transforms as a TFMessage, including the header.
 
     Raises:
         ValueError: if a name contains a NUL or a lone surrogate, or a stamp does not fit.
@@ -94,19 +95,19 @@ def encode(transforms: Sequence[SentTransform]) -> bytes:
 class Template:
     """A TFMessage with constant names, whose time and poses are set before each use.
 
-    Initially the time is 0 and poses are the identity. All transforms have the same time: the
-    bytes between two stamps are kept as one piece, and the message is the pieces joined by the
-    stamp.
+    Initially, the time is 0 and poses are the identity. All transforms have the same time. The
+    bytes between two stamps are kept as a piece, and the message consists of the pieces joined by
+    the stamp.
     """
 
     def __init__(self, edges: Sequence[tuple[str, str]]) -> None:
         self._head = LITTLE_ENDIAN + struct.pack("<I", len(edges))
         self._bodies: list[bytearray] = []
         self._stamp = _stamp(0)
-        at = len(self._head)
+        offset = len(self._head)
         for parent, child in edges:
-            self._bodies.append(_body(at + _STAMP, parent, child))
-            at += _STAMP + len(self._bodies[-1])
+            self._bodies.append(_body(offset + _STAMP, parent, child))
+            offset += _STAMP + len(self._bodies[-1])
 
     def __len__(self) -> int:
         return len(self._bodies)
@@ -125,7 +126,7 @@ class Template:
         self._stamp = _stamp(stamp_ns)
 
     def set_pose(self, index: int, pose: Pose) -> None:
-        """Set the pose of the child in the parent of that transform.
+        """Set the pose of the child in the parent for the transform at ``index``.
 
         Raises:
             IndexError: if there is no such edge.
@@ -135,21 +136,21 @@ class Template:
 
     def offsets(self) -> list[tuple[int, int]]:
         """Return the byte offsets of each transform's stamp and seven doubles."""
-        found = []
-        at = len(self._head)
+        places = []
+        offset = len(self._head)
         for body in self._bodies:
-            end = at + _STAMP + len(body)
-            found.append((at, end - _POSE.size))
-            at = end
-        return found
+            end = offset + _STAMP + len(body)
+            places.append((offset, end - _POSE.size))
+            offset = end
+        return places
 
 
 class ArrayTemplate:
     """A TFMessage with constant names, whose poses are written as numpy arrays.
 
-    Nothing is converted one by one. All transforms have the same time. ``doubles`` are all places
-    for a double in the message; ``xyz_at`` and ``quat_at``, of shapes (n, 3) and (n, 4), are the
-    indices of each transform's translation (m) and its quaternion x y z w.
+    Nothing is converted one by one. All transforms have the same time. ``doubles`` are all double
+    slots in the message. ``xyz_at`` and ``quat_at``, of shapes (n, 3) and (n, 4), are the indices
+    of each transform's translation in metres and its quaternion x y z w.
     """
 
     def __init__(self, edges: Sequence[tuple[str, str]], poses: Sequence[Pose]) -> None:
@@ -159,37 +160,37 @@ class ArrayTemplate:
         for index, pose in enumerate(poses):
             template.set_pose(index, pose)
         data = template.data
-        # Doubles are aligned from the end of the header: the buffer begins so that they are
-        # aligned in memory, too.
+        # Doubles are aligned relative to the end of the header. The buffer begins so that they are
+        # also aligned in memory.
         raw = np.zeros(_HEADER + len(data) + -(len(data) - _HEADER) % 8, np.uint8)
         raw[_HEADER : _HEADER + len(data)] = np.frombuffer(data, np.uint8)
         self._message = raw[_HEADER : _HEADER + len(data)]
         self.doubles: NDArray[np.float64] = raw[2 * _HEADER :].view("<f8")
         self._words: NDArray[np.uint32] = raw[2 * _HEADER :].view("<u4")
-        found = np.array(template.offsets(), np.intp).reshape(-1, 2) - _HEADER
-        self._stamp_at = (found[:, :1] // 4 + np.arange(2)).ravel()
-        start = found[:, 1:] // 8
+        gaps = np.array(template.offsets(), np.intp).reshape(-1, 2) - _HEADER
+        self._stamp_at = (gaps[:, :1] // 4 + np.arange(2)).ravel()
+        start = gaps[:, 1:] // 8
         self.xyz_at: NDArray[np.intp] = start + np.arange(3)
         self.quat_at: NDArray[np.intp] = start + np.arange(3, 7)
 
     def data(self, stamp_ns: int) -> bytes:
-        """Return the message with its current poses and this time in nanoseconds since the epoch.
+        """Return the message with its current poses and a time in nanoseconds since the epoch.
 
         Raises:
-            ValueError: if a message cannot hold it.
+            ValueError: if a message cannot hold the time.
         """
         self._words.put(self._stamp_at, struct.unpack("<II", _stamp(stamp_ns)))
         return self._message.tobytes()
 
 
-def _body(at: int, parent: str, child: str) -> bytearray:
-    """Return the bytes after a stamp at byte ``at``, with identity in the last seven doubles."""
+def _body(offset: int, parent: str, child: str) -> bytearray:
+    """Return the bytes after a stamp at ``offset``; the last seven doubles are the identity."""
     out = bytearray()
     for name in (parent, child):
-        out += bytes(_gap(at + len(out), 4))
+        out += bytes(_gap(offset + len(out), 4))
         raw = _name(name)
         out += struct.pack("<I", len(raw)) + raw
-    out += bytes(_gap(at + len(out), 8))
+    out += bytes(_gap(offset + len(out), 8))
     return out + _IDENTITY
 
 
@@ -207,30 +208,30 @@ def _stamp(stamp_ns: int) -> bytes:
         raise ValueError(f"the time {stamp_ns} ns does not fit into a message") from None
 
 
-def _gap(at: int, alignment: int) -> int:
-    return (_HEADER - at) % alignment
+def _gap(offset: int, alignment: int) -> int:
+    return (_HEADER - offset) % alignment
 
 
 # Reading.
 
 
 def decode(data: bytes) -> list[SentTransform]:
-    """Return the transforms of a TFMessage, in order.
+    """Return the transforms of a TFMessage in order.
 
-    Either byte order is read, and bytes after the last are ignored. Work and memory are bounded by
-    the length of ``data``, whatever it claims to hold.
+    Both byte orders are supported, and bytes after the last transform are ignored. Work and memory
+    are limited by the length of ``data``, even if it claims to contain more.
 
     Raises:
-        ValueError: with one sentence, if it is not a TFMessage.
+        ValueError: with a sentence, if it is not a TFMessage.
     """
     return list(transforms(data))
 
 
 def transforms(data: bytes) -> Iterator[SentTransform]:
-    """Yield the transforms of a TFMessage as they are read, as ``decode`` returns them.
+    """Yield the transforms of a TFMessage one by one, as ``decode`` returns them.
 
     Raises:
-        ValueError: with one sentence, if it is not a TFMessage.
+        ValueError: with a sentence, if it is not a TFMessage.
     """
     reader = _MessageReader(data)
     for _ in range(reader.begin()):
@@ -238,9 +239,9 @@ def transforms(data: bytes) -> Iterator[SentTransform]:
 
 
 def number_of_transforms(data: bytes) -> int:
-    """Return how many transforms a message claims to hold, at most as many as fit into it.
+    """Return the number of transforms that a message claims, at most as many as fit in it.
 
-    Reads nothing else.
+    Nothing else is read.
     """
     claimed = int.from_bytes(
         data[_HEADER : 2 * _HEADER], "big" if data[:2] == BIG_ENDIAN[:2] else "little"
@@ -251,17 +252,17 @@ def number_of_transforms(data: bytes) -> int:
 class MessageLayout:
     """The constant part of a publisher's messages: the names, and the offsets of the numbers.
 
-    ``edges`` holds each transform's parent and child, in order, as sent. ``exact``: these are all
-    bytes of the names.
+    ``edges`` holds parent and child of each transform in order, as sent. ``exact``: the names have
+    no further bytes.
     """
 
     __slots__ = ("_fixed", "_plain", "_rows", "_stamps", "edges", "exact")
 
     def __init__(self, data: bytes) -> None:
-        """Take the layout of a message.
+        """Create the layout of a message.
 
         Raises:
-            ValueError: as ``decode`` does.
+            ValueError: as in ``decode``.
         """
         edges, self._stamps = _unpacking(data, f"{_POSE.size}x")
         self.edges: Edges = tuple(edges)
@@ -286,7 +287,7 @@ class MessageLayout:
         return self._plain
 
     def stamps(self, data: bytes) -> list[int] | None:
-        """Return each transform's stamp in nanoseconds, or None for another layout."""
+        """Return each transform's stamp in nanoseconds, None for a message of another layout."""
         try:
             values = self._stamps.unpack_from(data)
         except struct.error:
@@ -296,8 +297,8 @@ class MessageLayout:
         return [s * _SECOND_NS + ns for s, ns in zip(values[2::4], values[3::4], strict=True)]
 
     def rows(self, data: bytes) -> Iterable[Row] | None:
-        """Return the transforms, or None for a message of another layout."""
-        if self._rows is None:  # who needs stamps alone does without
+        """Return the transforms, None for a message of another layout."""
+        if self._rows is None:  # created on demand: some callers need only stamps
             if self.stamps(data) is None:
                 return None
             self._rows = (
@@ -312,16 +313,16 @@ class MessageLayout:
             return None
         if self._fixed != (values[:2], values[4::11], values[5::11]):
             return None
-        numbers = (values[at::11] for at in (2, 3, 6, 7, 8, 9, 10, 11, 12))
+        numbers = (values[offset::11] for offset in (2, 3, 6, 7, 8, 9, 10, 11, 12))
         return zip(parents, children, *numbers, strict=True)
 
 
 class Decoder:
     """Reads messages as ``decode`` does, twenty times faster for known layouts.
 
-    A message of a known length and beginning is unpacked in one call. If the number of transforms
-    and all names, with their lengths, are then at the same offsets, it has the same layout, and
-    its numbers are at the same offsets too. Padding is ignored.
+    A message of a known length and beginning is unpacked with a single call. If then the number of
+    transforms and all names with their lengths are at the same offsets, the message has the same
+    layout, so its numbers are at the same offsets, too. Padding is ignored.
     """
 
     def __init__(self) -> None:
@@ -331,14 +332,14 @@ class Decoder:
         self.read_anew = 0
 
     def knows(self, data: bytes) -> bool:
-        """Return whether the message has a known layout, and so is fast to read."""
+        """Return whether the message has a known layout, which makes it fast to read."""
         return any(layout.stamps(data) is not None for layout in self._layouts.get(_key(data), ()))
 
     def rows(self, data: bytes) -> Iterable[Row]:
-        """Return the transforms of a TFMessage, in order.
+        """Return the transforms of a TFMessage in order.
 
         Raises:
-            ValueError: with one sentence, if it is not a TFMessage.
+            ValueError: with a sentence, if it is not a TFMessage.
         """
         key = _key(data)
         for layout in self._layouts.get(key, ()):
@@ -351,7 +352,7 @@ class Decoder:
         """Return a TFMessage's layout with its names, and its stamps in nanoseconds.
 
         Raises:
-            ValueError: with one sentence, if it is not a TFMessage.
+            ValueError: with a sentence, if it is not a TFMessage.
         """
         key = _key(data)
         for layout in self._layouts.get(key, ()):
@@ -379,9 +380,9 @@ class Decoder:
 
 
 def _unpacking(data: bytes, pose: str) -> tuple[list[tuple[str, str]], struct.Struct]:
-    """Return a message's edges, and the struct that unpacks it.
+    """Return a message's edges, and the struct that unpacks the message.
 
-    Header, count, and for each transform stamp, names and ``pose``.
+    The struct covers the header, the count, and for each transform stamp, names and ``pose``.
     """
     reader = _MessageReader(data)
     edges: list[tuple[str, str]] = []
@@ -395,7 +396,7 @@ def _as_taken(raw: bytes) -> str:
 
 
 def plain_name(frame: str) -> str:
-    """Return a frame's name as tf2 reads it, without a leading slash, printable and cut short."""
+    """Return a frame's name as tf2 reads it, without a leading slash, printable and shortened."""
     name = frame.removeprefix("/")
     if not name.isprintable():
         name = visible(name)
@@ -406,20 +407,20 @@ def _key(data: bytes) -> tuple[int, bytes, bytes]:
     """Return a key that differs for most layouts: the length, and the first two names."""
     order: Order = "big" if data[:2] == BIG_ENDIAN[:2] else "little"
     parent = _raw_name(data, _FIRST_PARENT, order)
-    at = _FIRST_PARENT + len(parent)
-    return len(data), parent, _raw_name(data, at + _gap(at, 4), order)
+    offset = _FIRST_PARENT + len(parent)
+    return len(data), parent, _raw_name(data, offset + _gap(offset, 4), order)
 
 
-def _raw_name(data: bytes, at: int, order: Order) -> bytes:
-    """Return a name with its length before it, as far as the data go."""
-    return data[at : at + 4 + int.from_bytes(data[at : at + 4], order)]
+def _raw_name(data: bytes, offset: int, order: Order) -> bytes:
+    """Return a name with its length before it, truncated at the end of the data."""
+    return data[offset : offset + 4 + int.from_bytes(data[offset : offset + 4], order)]
 
 
 class _MessageReader:
     """Reads a message from start to end.
 
     Raises:
-        ValueError: with one sentence, if it is not a TFMessage.
+        ValueError: with a sentence, if it is not a TFMessage.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -444,8 +445,7 @@ class _MessageReader:
     def skip(self, edges: list[tuple[str, str]]) -> str:
         """Skip a transform and record its parent and child.
 
-        Return the struct format of its stamp and of its names, each with its length, up to the
-        doubles.
+        Return the struct format of its stamp and its names, with their lengths, up to the doubles.
         """
         start = self._at
         self.numbers("iI", 4)

@@ -1,4 +1,4 @@
-"""Listening to TF in a node: one that the program spins, or a private one with a thread."""
+"""Listening to TF in a node that the program spins, or in a private node with a thread."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from rclpy.qos import QoSProfile
 
-    #: Is called with the bytes of each message, and whether it came on the static topic.
+    #: Called with the bytes of each message, and whether it arrived on the static topic.
     OnMessage = Callable[[bytes, bool], None]
 
 _numbers = count(1)
@@ -50,15 +50,15 @@ class TransformTopic(NamedTuple):
 
     @property
     def profile(self) -> QoSProfile:
-        """The profile to subscribe with."""
+        """The profile for the subscription."""
         return profile_of(self.qos, TF_STATIC_READER if self.static else TF_READER)
 
 
 class NodeListener:
     """Subscriptions in the caller's node.
 
-    Its executor calls ``on_message``, or ``poll`` does. ``spin``: an executor in a separate thread
-    spins the whole node, as tf2_ros's listener does.
+    The node's executor calls ``on_message``, or ``poll`` does. ``spin``: an executor in a separate
+    thread spins the entire node, as tf2_ros's listener does.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class NodeListener:
         self._on_message = on_message
         group = (
             ReentrantCallbackGroup()
-        )  # another callback of the node may wait for what these bring
+        )  # another callback of the node may wait for these messages
         self._subscriptions = [(self._subscribe(topic, group), topic.static) for topic in topics]
         self._executor: Any = None
         if spin:
@@ -77,7 +77,7 @@ class NodeListener:
             self._thread.start()
 
     def poll(self) -> None:
-        """Take pending messages without blocking, for a caller that keeps the executor from it."""
+        """Take pending messages without blocking, for a caller that blocks the executor."""
         for subscription, static in self._subscriptions:
             with suppress(_rclpy.InvalidHandle), subscription.handle:
                 while (
@@ -86,7 +86,7 @@ class NodeListener:
                     self._on_message(taken[0], static)
 
     def close(self) -> None:
-        """End the thread, if there is one, and the subscriptions; the node stays."""
+        """Stop the thread, if there is one, and the subscriptions. The node stays."""
         if self._executor is not None:
             self._executor.shutdown()
             self._thread.join()
@@ -140,7 +140,7 @@ class ThreadListener:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread and the node."""
+        """Stop the thread and the node."""
         self._stop.request()
         self._thread.join()
         self._subscriptions.clear()
@@ -171,8 +171,8 @@ class ThreadListener:
 def on_clock_jump(node: Node, callback: Callable[[], object]) -> Any:
     """Call back when the node's clock goes back, or switches between simulated and system time.
 
-    Stops when the result is deleted. The threshold is that of tf2_ros's ``Buffer`` in C++: any
-    step back counts, and none forward.
+    This ends when the result is deleted. The threshold is that of tf2_ros's ``Buffer`` in C++: any
+    step back counts, and no step forward.
     """
     log: Any = node
 
@@ -196,7 +196,7 @@ def on_clock_jump(node: Node, callback: Callable[[], object]) -> Any:
 def offer_frames(node: Node, text: Callable[[], str]) -> Any:
     """Offer the service ``tf2_frames``, which answers with the text.
 
-    Return it, or None if tf2_msgs is not installed.
+    Return the service, None if tf2_msgs is not installed.
     """
     if find_spec("tf2_msgs") is None:
         return None

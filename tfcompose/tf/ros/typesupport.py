@@ -1,25 +1,24 @@
 """The type of TFMessage for rclpy: the installed ``tf2_msgs``, or our own type support.
 
-PyPI has rclpy and geometry_msgs but no tf2_msgs, and a type support is normally compiled.
-tfcompose publishes and takes only serialised messages, and for that rclpy and rmw_fastrtps_cpp
-need no more than the type's name, shape, description and hash. All else is borrowed from
-``geometry_msgs/TransformStamped``, at run time, with ctypes:
+PyPI has rclpy and geometry_msgs but no tf2_msgs, and a type support is normally compiled code.
+tfcompose only publishes and takes serialised messages. For that, rclpy and rmw_fastrtps_cpp need
+only the type's name, shape, description and hash. Everything else is borrowed from
+``geometry_msgs/TransformStamped`` at run time, with ctypes:
 
-- the type support of TFMessage is a ``rosidl_message_type_support_t`` that, asked for
-  ``rosidl_typesupport_fastrtps_c`` or ``rosidl_typesupport_introspection_c``, gives one of two
-  further ones, and none for any other;
-- the first holds a copy of TransformStamped's callbacks with TFMessage's namespace and name;
-- the second says that there is one member, ``transforms``, a sequence of TransformStamped;
-- the description is made here, with those of the types that it refers to copied from
+- The type support of TFMessage is a ``rosidl_message_type_support_t``. For
+  ``rosidl_typesupport_fastrtps_c`` and ``rosidl_typesupport_introspection_c`` it returns one of
+  two further type supports, and for any other identifier none.
+- The first has a copy of TransformStamped's callbacks with TFMessage's namespace and name.
+- The second declares a single member, ``transforms``, a sequence of TransformStamped.
+- The description is built here. Descriptions of the types that it refers to are copied from
   TransformStamped's. The texts of the message files are TransformStamped's; no node of tfcompose
   serves them.
 
 The module begins with rosidl's C structures for ctypes. Sources: rosidl (Jazzy)
 ``message_type_support_struct.h``, ``type_hash.h``, ``type_description/*__struct.h`` and
 ``message_introspection.h``; rosidl_typesupport_fastrtps (Jazzy) ``message_type_support.h``. No
-compiler checks these layouts, so all values are checked before use: names are where they are
-expected, and both types' hashes, computed from the descriptions (REP-2016), are the ones that ROS
-knows.
+compiler checks these layouts. So all values are checked before use: names are at the expected
+places, and both types' hashes, computed from the descriptions (REP-2016), are the known ones.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ _UNBOUNDED_SEQUENCE_OF_MESSAGES = 145
 # rosidl_typesupport_introspection_c ``field_types.h``.
 _ROS_TYPE_MESSAGE = 18
 
-# More than any message has: what a structure that is not the expected one may claim.
+# Upper limit for plausible counts. A structure with another layout may claim more.
 _MOST = 1000
 
 # rosidl's structures.
@@ -132,13 +131,13 @@ class String(ctypes.Structure):
 
     @classmethod
     def of(cls, text: str) -> String:
-        """Return the string; it lives as long as the returned object."""
+        """Return the string. It lives as long as the returned object."""
         raw = text.encode()
         return cls(raw, len(raw), len(raw) + 1)
 
     @property
     def text(self) -> str:
-        """The string in Python; a ValueError if its length is wrong."""
+        """The string in Python. Raises a ValueError if its length is wrong."""
         raw: bytes = self.data or b""
         if len(raw) != self.size:
             raise ValueError("a string is shorter or longer than it says")
@@ -163,7 +162,7 @@ class FieldDescription(ctypes.Structure):
 
 
 class Fields(ctypes.Structure):
-    """A sequence of ``FieldDescription``; every sequence in C messages has this size."""
+    """A sequence of ``FieldDescription``. Every sequence in C messages has this size."""
 
     _fields_ = (
         ("data", ctypes.POINTER(FieldDescription)),
@@ -199,12 +198,12 @@ class TypeDescription(ctypes.Structure):
 
 @cache
 def tf_message_type() -> Any:
-    """Return the class to give rclpy for ``tf2_msgs/msg/TFMessage``.
+    """Return the class that rclpy needs for ``tf2_msgs/msg/TFMessage``.
 
     Only its bytes can be published and taken.
 
     Raises:
-        RosError: if tf2_msgs is not installed and this ROS does not match our own type support.
+        RosError: if tf2_msgs is not installed, and this ROS does not match our own type support.
     """
     if find_spec("tf2_msgs") is not None:
         # The wheels from PyPI lack it.
@@ -220,8 +219,7 @@ def own_type() -> Any:
     """Return a class with our own type support, as ``tf_message_type`` does without tf2_msgs.
 
     Raises:
-        RosError: if the rmw is not rmw_fastrtps_cpp, or rosidl's structures are not the expected
-            ones.
+        RosError: if the rmw is not rmw_fastrtps_cpp, or rosidl's structures are unexpected.
     """
     rmw = get_rmw_implementation_identifier()
     if rmw != _RMW:
@@ -241,9 +239,12 @@ def own_type() -> Any:
 
 
 def _build() -> tuple[TypeSupport, list[Any]]:
-    """Return the type support and all that it points to, which must live as long."""
+    """Return the type support and everything that it points to, which must live as long."""
     stamped = _stamped_typesupport()
-    fast, introspection = _other(stamped, _FASTRTPS), _other(stamped, _INTROSPECTION)
+    fast, introspection = (
+        _find_type_support(stamped, _FASTRTPS),
+        _find_type_support(stamped, _INTROSPECTION),
+    )
     callbacks, members = _callbacks(fast), _members(introspection)
     description, described = _description(description_of(fast, ctypes.addressof(fast)))
     value = (ctypes.c_uint8 * 32).from_buffer_copy(
@@ -267,12 +268,12 @@ def _build() -> tuple[TypeSupport, list[Any]]:
     return made, alive
 
 
-def _other(stamped: int, identifier: bytes) -> TypeSupport:
-    """Return TransformStamped's type support of that name."""
-    found = Handle(TypeSupport.from_address(stamped).func)(stamped, identifier)
-    if not found or TypeSupport.from_address(found).identifier != identifier:
+def _find_type_support(stamped: int, identifier: bytes) -> TypeSupport:
+    """Return TransformStamped's type support with this identifier."""
+    address = Handle(TypeSupport.from_address(stamped).func)(stamped, identifier)
+    if not address or TypeSupport.from_address(address).identifier != identifier:
         raise ValueError(f"TransformStamped has no {identifier.decode()}")
-    return TypeSupport.from_address(found)
+    return TypeSupport.from_address(address)
 
 
 def _callbacks(fast: TypeSupport) -> Callbacks:
@@ -284,11 +285,11 @@ def _callbacks(fast: TypeSupport) -> Callbacks:
 
 
 def _members(introspection: TypeSupport) -> Members:
-    known = Members.from_address(introspection.data)
-    names = (known.namespace, known.name, known.count)
+    members = Members.from_address(introspection.data)
+    names = (members.namespace, members.name, members.count)
     if names != (b"geometry_msgs__msg", b"TransformStamped", 3):
         raise ValueError("TransformStamped's members do not start with its name")
-    if [member.name for member in known.members[:3]] != [
+    if [member.name for member in members.members[:3]] != [
         b"header",
         b"child_frame_id",
         b"transform",
@@ -309,8 +310,8 @@ def _getter(structure: ctypes.Structure) -> Any:
 def _stamped_typesupport() -> int:
     """Return the address of TransformStamped's type support, after a layout check.
 
-    It is taken as ``geometry_msgs.msg`` takes it, but without that, which imports numpy for its
-    covariances.
+    It is obtained like in ``geometry_msgs.msg``, but without importing that module, which imports
+    numpy for its covariances.
     """
     capsule = getattr(
         import_type_support("geometry_msgs"), "type_support_msg__msg__transform_stamped", None
@@ -327,15 +328,15 @@ def _stamped_typesupport() -> int:
 
 
 def _description(stamped: TypeDescription) -> tuple[TypeDescription, list[Any]]:
-    """Return TFMessage's description, and what it points to."""
+    """Return TFMessage's description, and the objects that it points to."""
     kind = FieldType(_UNBOUNDED_SEQUENCE_OF_MESSAGES, 0, 0, String.of(_STAMPED))
     field = FieldDescription(String.of("transforms"), kind, String.of(""))
-    known = [*stamped.referenced.data[: stamped.referenced.size], stamped.type_description]
-    known.sort(key=lambda each: each.type_name.text)
-    types = (Type * len(known))(*known)
+    referenced = [*stamped.referenced.data[: stamped.referenced.size], stamped.type_description]
+    referenced.sort(key=lambda each: each.type_name.text)
+    types = (Type * len(referenced))(*referenced)
     fields = Fields(ctypes.pointer(field), 1, 1)
     made = TypeDescription(
-        Type(String.of(TF_MESSAGE), fields), Types(types, len(known), len(known))
+        Type(String.of(TF_MESSAGE), fields), Types(types, len(referenced), len(referenced))
     )
     return made, [field, types]
 
@@ -349,10 +350,10 @@ def _message_class(support: TypeSupport, alive: list[Any]) -> Any:
 
 @cache
 def joint_state_type() -> Any:
-    """Return the class to give rclpy for sensor_msgs/JointState.
+    """Return the class that rclpy needs for sensor_msgs/JointState.
 
-    Only its bytes can be published and taken. It is made without ``sensor_msgs.msg``, which
-    imports numpy for its covariances.
+    Only its bytes can be published and taken. The class is created without ``sensor_msgs.msg``,
+    which imports numpy for its covariances.
 
     Raises:
         RosError: if sensor_msgs has no such type.
@@ -367,8 +368,8 @@ def joint_state_type() -> Any:
 
 def _bytes_class(type_: str, attributes: dict[str, Any]) -> Any:
     """Return a message class that rclpy accepts, but that cannot be instantiated."""
-    # rclpy wants all five. The last four convert messages that are objects; they are no capsules,
-    # so that a use raises.
+    # rclpy requires all five. The last four convert message objects. Here they are not capsules,
+    # so that any use raises an error.
     converters = (
         "_CREATE_ROS_MESSAGE",
         "_CONVERT_FROM_PY",
@@ -390,21 +391,21 @@ def _bytes_class(type_: str, attributes: dict[str, Any]) -> Any:
 def type_hash(description: dict[str, Any]) -> str:
     """Return the RIHS01 hash of a type description without default values.
 
-    SHA-256 of its JSON (REP-2016).
+    It is the SHA-256 of the description's JSON (REP-2016).
     """
     return "RIHS01_" + sha256(json.dumps(description).encode()).hexdigest()
 
 
 def description_json(type_support: int) -> dict[str, Any]:
-    """Return the type description of the type support at that address, ready for ``type_hash``.
+    """Return the type description of the type support at an address, as ``type_hash`` needs it.
 
     Raises:
         ValueError: if there are no such structures at that address.
     """
-    found = description_of(TypeSupport.from_address(type_support), type_support)
-    referenced = found.referenced
+    description = description_of(TypeSupport.from_address(type_support), type_support)
+    referenced = description.referenced
     return {
-        "type_description": _type_json(found.type_description),
+        "type_description": _type_json(description.type_description),
         "referenced_type_descriptions": [
             _type_json(each) for each in referenced.data[: _few(referenced.size)]
         ],
@@ -412,10 +413,10 @@ def description_json(type_support: int) -> dict[str, Any]:
 
 
 def hash_text(type_support: int) -> str:
-    """Return the hash of the type support at that address, in the form of REP-2016."""
+    """Return the hash of the type support at an address, in the form of REP-2016."""
     getter = Getter(TypeSupport.from_address(type_support).get_hash)
-    found = Hash.from_address(getter(type_support))
-    return f"RIHS{found.version:02}_{bytes(found.value).hex()}"
+    type_hash = Hash.from_address(getter(type_support))
+    return f"RIHS{type_hash.version:02}_{bytes(type_hash.value).hex()}"
 
 
 def capsule_address(capsule: object) -> int:
@@ -426,9 +427,10 @@ def capsule_address(capsule: object) -> int:
 
 
 def description_of(support: TypeSupport, address: int) -> TypeDescription:
-    """Return the description from a type support at that address.
+    """Return the description from a type support at an address.
 
-    A ValueError if it has none.
+    Raises:
+        ValueError: if it has no description.
     """
     where = Getter(support.get_description)(address)
     if not where:

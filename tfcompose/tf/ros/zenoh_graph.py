@@ -1,16 +1,17 @@
 """Publishers on rmw_zenoh, from liveliness tokens and attachments, without rclpy.
 
-Facts of rmw_zenoh_cpp (docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp; the same in
-Jazzy, Kilted and Rolling). Every publisher declares the liveliness token
+Facts about rmw_zenoh_cpp (docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp), the same
+in Jazzy, Kilted and Rolling: Every publisher declares the liveliness token
 ``@ros2_lv/DOMAIN/SESSION/NODE_ID/ID/MP/ENCLAVE/NAMESPACE/NODE/TOPIC/TYPE/TYPE_HASH/QOS``. In its
-parts ``%`` replaces a slash; ``MP`` means a publisher. The publisher's id (gid) is the XXH3 hash
-of the token, 128 bits, least significant byte first. It sends on the key
+parts ``%`` replaces a slash. ``MP`` means a publisher. The publisher's id (gid) is the XXH3 hash
+of the token, 128 bits, least significant byte first. It publishes on the key
 ``DOMAIN/TOPIC/TYPE/TYPE_HASH`` with an attachment of 33 bytes: its count of messages and the time,
-int64 each, and the id preceded by its length. Older releases wrote the name of each of the three
-before it. ``QOS`` is ``RELIABILITY:DURABILITY:HISTORY,DEPTH:…`` in rmw's numbers; an empty part
-means the default, reliable and volatile.
+int64 each, and the id preceded by its length. In older releases, the name of each value preceded
+it. ``QOS`` is ``RELIABILITY:DURABILITY:HISTORY,DEPTH:…`` in rmw's numbers; an empty part means the
+default, reliable and volatile.
 
-Only robots on Zenoh need this module: it loads eclipse-zenoh and xxhash, of the extra ``zenoh``.
+Only robots on Zenoh need this module. It imports eclipse-zenoh and xxhash from the extra
+``zenoh``.
 """
 
 from __future__ import annotations
@@ -36,12 +37,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _SPACE, _PUBLISHER = "@ros2_lv", "MP"
-#: Number of parts of a publisher's token; later releases may add some.
+#: Number of parts of a publisher's token. Later releases may add parts.
 _PARTS = 13
 _BEST_EFFORT, _TRANSIENT_LOCAL = "2", "1"
 _TYPE = re.compile(r"(.+)::dds_::(\w+)_")
 _ATTACHMENT = struct.Struct("<qqB16s")
-#: With the names of older releases, each with its length before it.
+#: The attachment of older releases, with names, each preceded by its length.
 _NAMED = struct.Struct("<16sq17sq11sB16s")
 _NAMES = (b"\x0fsequence_number", b"\x10source_timestamp", b"\x0asource_gid")
 _GID_BYTES = 16
@@ -49,19 +50,19 @@ _ROUTER = '["tcp/localhost:7447"]'
 _TF_TYPE = "tf2_msgs::msg::dds_::TFMessage_"
 #: Maximum number of messages that wait to be taken.
 _MOST_WAITING = 20_000
-#: Maximum number of tokens that came or went and wait until publishers are requested.
+#: Maximum number of changed tokens that wait until publishers are requested.
 _MOST_TOKENS = 100_000
-#: Number of latched messages requested of a publisher.
+#: Number of latched messages to request from a publisher.
 _LATCHED = 100
 
 
 @dataclass(frozen=True, slots=True)
 class TokenOfPublisher:
-    """A publisher, as its token describes it. Names are as ROS writes them."""
+    """A publisher as described by its token. Names are as in ROS."""
 
-    #: Its id, 16 bytes.
+    #: The publisher's id, 16 bytes.
     gid: bytes
-    #: Its node's full name.
+    #: The full name of the publisher's node.
     node: str
     topic: str
     type: str
@@ -71,7 +72,7 @@ class TokenOfPublisher:
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """The attachment of a message: the publisher's count, the time sent, and the publisher's id.
+    """The attachment of a message: count of messages, time of sending, and publisher's id.
 
     The id has 16 bytes.
     """
@@ -83,7 +84,7 @@ class Attachment:
 
 @dataclass(frozen=True, slots=True)
 class ZenohMessage:
-    """A message of a TF topic as bytes; without an attachment, its sender is unknown."""
+    """A message of a TF topic as bytes. Without an attachment, its sender is unknown."""
 
     data: bytes
     static: bool
@@ -104,7 +105,9 @@ def publisher_of(token: str) -> TokenOfPublisher | None:
     parts = token.split("/")
     if len(parts) < _PARTS or parts[0] != _SPACE or parts[5] != _PUBLISHER:
         return None
-    namespace, node, topic, kind, qos = (parts[at].replace("%", "/") for at in (7, 8, 9, 10, 12))
+    namespace, node, topic, kind, qos = (
+        parts[index].replace("%", "/") for index in (7, 8, 9, 10, 12)
+    )
     reliability, _, rest = qos.partition(":")
     match = _TYPE.fullmatch(kind)
     return TokenOfPublisher(
@@ -118,7 +121,7 @@ def publisher_of(token: str) -> TokenOfPublisher | None:
 
 
 def attachment_of(data: bytes) -> Attachment | None:
-    """Return the parsed attachment, or None if it is not rmw_zenoh's."""
+    """Return the parsed attachment, None if it is not from rmw_zenoh."""
     if len(data) == _ATTACHMENT.size:
         sequence, source_ns, length, gid = _ATTACHMENT.unpack(data)
         return Attachment(sequence, source_ns, gid) if length == _GID_BYTES else None
@@ -130,14 +133,14 @@ def attachment_of(data: bytes) -> Attachment | None:
 
 
 def open_session(environment: Mapping[str, str]) -> zenoh.Session:
-    """Return a session that reaches the robot's router, as a client.
+    """Return a client session that is connected to the robot's router.
 
-    Close it: Python does not exit while it is open. The environment's variables apply as for
-    rmw_zenoh's own sessions, except for the mode: a router forwards to clients what peers send to
-    each other.
+    Close the session, because Python does not exit while it is open. The environment variables of
+    rmw_zenoh's sessions apply, except for the mode. A client is necessary, because a router
+    forwards messages between peers to clients.
 
     Raises:
-        RosError: with one sentence, if there is no router, or no such configuration.
+        RosError: with a sentence, if there is no router, or the configuration is missing.
     """
     try:
         file = environment.get(ZENOH_FILES[0])
@@ -157,10 +160,10 @@ def open_session(environment: Mapping[str, str]) -> zenoh.Session:
 
 
 class ZenohGraph:
-    """The publishers of a domain, as long as its session lives.
+    """The publishers of a domain, as long as its session is open.
 
     Tokens wait in a channel until a query. A callback would have its own thread, and Python would
-    wait for that thread before it calls the function that ends the session.
+    wait for that thread before it calls the function that closes the session.
     """
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
@@ -174,10 +177,10 @@ class ZenohGraph:
         """Return the topic's current publishers, by its full name, sorted by node and id."""
         with self._lock:
             self._take()
-            found = [
+            publishers = [
                 publisher for publisher in self._publishers.values() if publisher.topic == topic
             ]
-        return sorted(found, key=lambda publisher: (publisher.node, publisher.gid))
+        return sorted(publishers, key=lambda publisher: (publisher.node, publisher.gid))
 
     def close(self) -> None:
         """End the subscription."""
@@ -195,7 +198,7 @@ class ZenohGraph:
 class ZenohTF:
     """Messages on a pair of TF topics (moving, fixed), each with its sender.
 
-    Latched ones arrive at once.
+    Latched messages arrive at once.
     """
 
     def __init__(self, session: zenoh.Session, domain: int, topics: tuple[str, str]) -> None:
@@ -217,11 +220,11 @@ class ZenohTF:
     def take(self) -> list[ZenohMessage]:
         """Return the messages received since the last call, oldest first."""
         self._came.clear()
-        found = []
+        endpoints = []
         with suppress(IndexError):
             while True:
-                found.append(self._waiting.popleft())
-        return found
+                endpoints.append(self._waiting.popleft())
+        return endpoints
 
     def close(self) -> None:
         """End the subscriptions."""
@@ -237,12 +240,12 @@ class ZenohTF:
 
 
 def domain_of(environment: Mapping[str, str]) -> int:
-    """Return the ROS domain that the environment names."""
+    """Return the ROS domain that the environment sets."""
     return int(environment.get(DOMAIN) or 0)
 
 
 class RobotGraph:
-    """The graph of this process's domain, over a session opened on first use."""
+    """The graph of this process's domain, through a session that is opened on first use."""
 
     def __init__(self) -> None:
         self._session: Any = open_session(os.environ)
@@ -253,6 +256,6 @@ class RobotGraph:
         return self._graph.publishers(topic)
 
     def close(self) -> None:
-        """End the session; Python does not exit while it is open."""
+        """Close the session. Python does not exit while it is open."""
         self._graph.close()
         self._session.close()

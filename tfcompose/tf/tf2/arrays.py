@@ -1,6 +1,6 @@
 """Many poses and points at once: trajectories, arrays of points and PointCloud2.
 
-This module needs numpy.
+This module requires numpy.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Stamps = NDArray[np.int64]
 
-# Number of times handled at once, which bounds the length of temporary arrays.
+# Number of times per block, which limits the size of temporary arrays.
 _BLOCK = 1 << 14
 _ARRAYS = 64
-# Number of points that fit into the processor's cache.
+# Number of points per block, so that a block fits into the CPU's cache.
 _POINTS = 1 << 13
-# Angles, in radians, up to which sine and cosine are summed up, to x¹³ and x¹².
+# Angle in radians up to which sine and cosine are computed as series, to x¹³ and x¹².
 _SMALL = 0.4
 _SINE = [(-1) ** k / factorial(2 * k + 1) for k in range(6, -1, -1)]
 _COSINE = [(-1) ** k / factorial(2 * k) for k in range(6, -1, -1)]
@@ -43,7 +43,7 @@ _FIELD_TYPES = {7: "f4", 8: "f8"}
 
 
 class Trajectory(NamedTuple):
-    """N poses of a frame in another."""
+    """N poses of a frame in another frame."""
 
     #: N×3, in metres.
     xyz: Floats
@@ -53,7 +53,7 @@ class Trajectory(NamedTuple):
     def matrices(self) -> Floats:
         """Return the poses as homogeneous matrices, N×4×4.
 
-        They take coordinates in the source to the target.
+        They map coordinates in the source to coordinates in the target.
         """
         x, y, z, w = self.quat_xyzw.T
         made = np.zeros((len(self.xyz), 4, 4))
@@ -80,7 +80,7 @@ def stamps_of(stamps: ArrayLike) -> Stamps:
     """Return times in nanoseconds as an array of int64.
 
     Raises:
-        TypeError: if they are not whole numbers in one row.
+        TypeError: if they are not integers in a one-dimensional array.
     """
     array = np.asarray(stamps)
     if array.ndim != 1 or (array.dtype.kind not in "iu" and array.size):
@@ -93,48 +93,48 @@ def stamps_of(stamps: ArrayLike) -> Stamps:
 def lookup_many(
     buffer: PoseBuffer, target: str, source: str, stamps: ArrayLike, outside: str
 ) -> Trajectory:
-    """Return what ``Buffer.lookup_many`` does."""
+    """Return the result of ``Buffer.lookup_many``."""
     times = stamps_of(stamps)
     with buffer.lock():
         if not times.all():
             times = np.where(times == 0, buffer.lookup(target, source)[1], times)
         chain = buffer.chain_for_all_times(target, source)
-        found, known = (
+        trajectory, is_known = (
             _at_once(chain, times) if chain else _one_by_one(buffer, target, source, times)
         )
-        if outside == "raise" and not known.all():
-            first = int(times[np.argmin(known)])
+        if outside == "raise" and not is_known.all():
+            first = int(times[np.argmin(is_known)])
             reason = buffer.can_lookup(target, source, first)
             raise ExtrapolationException(
-                f"{reason}; so it is for {np.count_nonzero(~known)} of {len(times)} times"
+                f"{reason}; so it is for {np.count_nonzero(~is_known)} of {len(times)} times"
             )
-    found.xyz[~known], found.quat_xyzw[~known] = np.nan, np.nan
-    return found
+    trajectory.xyz[~is_known], trajectory.quat_xyzw[~is_known] = np.nan, np.nan
+    return trajectory
 
 
 def _one_by_one(
     buffer: PoseBuffer, target: str, source: str, stamps: Stamps
 ) -> tuple[Trajectory, NDArray[np.bool_]]:
-    """Return the poses where parents change over time, one chain for each time."""
-    known = np.ones(len(stamps), bool)
-    found = Trajectory(np.zeros((len(stamps), 3)), np.zeros((len(stamps), 4)))
+    """Return the poses if parents change over time, with a separate chain for each time."""
+    is_known = np.ones(len(stamps), bool)
+    trajectory = Trajectory(np.zeros((len(stamps), 3)), np.zeros((len(stamps), 4)))
     for index, stamp_ns in enumerate(stamps.tolist()):
         try:
             pose, _ = buffer.lookup(target, source, stamp_ns)
         except TransformException:
-            known[index] = False
+            is_known[index] = False
         else:
-            found.xyz[index], found.quat_xyzw[index] = pose.xyz, pose.quat_xyzw
-    return found, known
+            trajectory.xyz[index], trajectory.quat_xyzw[index] = pose.xyz, pose.quat_xyzw
+    return trajectory, is_known
 
 
 def _at_once(chain: PoseChain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
-    """Return the poses at those times, and a mask of times that all edges know.
+    """Return the poses at these times, and a mask of the times at which all edges have a pose.
 
     The poses at other times are undefined.
     """
-    known = np.ones(len(stamps), bool)
-    found = Trajectory(np.empty((len(stamps), 3)), np.empty((len(stamps), 4)))
+    is_known = np.ones(len(stamps), bool)
+    trajectory = Trajectory(np.empty((len(stamps), 3)), np.empty((len(stamps), 4)))
     order = None if (stamps[1:] >= stamps[:-1]).all() else np.argsort(stamps, kind="stable")
     for start in range(0, len(stamps), _BLOCK):
         block: Any = (
@@ -144,25 +144,26 @@ def _at_once(chain: PoseChain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.b
         _keep_memory(len(times))
         some = np.ones(len(times), bool)
         pose = _along(chain, times, some)
-        known[block] = some
-        found.xyz[block], found.quat_xyzw[block] = _of_unit_length(pose, len(times))
-    return found, known
+        is_known[block] = some
+        trajectory.xyz[block], trajectory.quat_xyzw[block] = _of_unit_length(pose, len(times))
+    return trajectory, is_known
 
 
 def _keep_memory(count: int) -> None:
-    """Free an array as large as one block needs, without touching it.
+    """Free an array of the size that a block needs, without touching it.
 
-    After that the C library (glibc) keeps that much memory between the steps instead of returning
-    it to the system and fetching it again page by page, which took longer than the arithmetic.
+    After that, the C library (glibc) keeps this much memory between the steps. Otherwise it would
+    return the memory to the system and get it again page by page, which took longer than the
+    arithmetic.
     """
     np.empty((_ARRAYS, count))
 
 
-def _along(chain: PoseChain, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Any, ...]:
-    """Return the chain's poses at ascending times, and clear ``known`` where an edge has none."""
+def _along(chain: PoseChain, stamps: Stamps, is_known: NDArray[np.bool_]) -> tuple[Any, ...]:
+    """Return the chain's poses at ascending times. Clear ``is_known`` where an edge has none."""
     pose: Any = None
     for cache, fixed, backwards in chain.links:
-        link: Any = fixed if cache is None else _poses(cache, stamps, known)
+        link: Any = fixed if cache is None else _poses(cache, stamps, is_known)
         if pose is None:
             pose = inverse(link) if backwards else link
         else:
@@ -181,29 +182,29 @@ def _of_unit_length(pose: tuple[Any, ...], count: int) -> Trajectory:
     return Trajectory(xyz, quat)
 
 
-def _poses(cache: TimeCache, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Floats, ...]:
+def _poses(cache: TimeCache, stamps: Stamps, is_known: NDArray[np.bool_]) -> tuple[Floats, ...]:
     """Return the edge's poses at ascending times as seven arrays.
 
-    Clears ``known`` where there is none.
+    ``is_known`` is cleared where there is no pose.
     """
     count = len(cache)
-    at = np.array(cache.stamps)[-count:]
+    stamps_ns = np.array(cache.stamps)[-count:]
     samples = np.array(cache.poses)[-7 * count :].reshape(count, 7).T.copy()
-    known[: np.searchsorted(stamps, at[0])] = False
-    known[np.searchsorted(stamps, at[-1], "right") :] = False
+    is_known[: np.searchsorted(stamps, stamps_ns[0])] = False
+    is_known[np.searchsorted(stamps, stamps_ns[-1], "right") :] = False
     if count == 1:
         return tuple(samples)
-    # Each stretch goes from one sample to the next. A time that is a sample's belongs to the
-    # stretch behind it, and there to the last sample of that time; but the first time of all to
-    # the first sample, the last to the last.
-    begins = np.searchsorted(stamps, at[1:-1])
-    if at[0] == at[1]:
-        begins[: np.searchsorted(at[1:-1], at[0], "right")] = np.searchsorted(
-            stamps, at[0], "right"
+    # Each interval goes from a sample to the next. A time equal to a sample's time belongs to the
+    # interval after it, with the last sample of that time. The first time of all belongs to the
+    # first sample, and the last time to the last.
+    begins = np.searchsorted(stamps, stamps_ns[1:-1])
+    if stamps_ns[0] == stamps_ns[1]:
+        begins[: np.searchsorted(stamps_ns[1:-1], stamps_ns[0], "right")] = np.searchsorted(
+            stamps, stamps_ns[0], "right"
         )
-    times = np.diff(begins, prepend=0, append=len(stamps))  # so many on each stretch
-    since = (stamps - at[0]).astype(np.float64)
-    rows = np.repeat(_stretches(at, samples), times, axis=1)
+    times = np.diff(begins, prepend=0, append=len(stamps))  # number of times in each interval
+    since = (stamps - stamps_ns[0]).astype(np.float64)
+    rows = np.repeat(_stretches(stamps_ns, samples), times, axis=1)
     x, y, z, dx, dy, dz, ax, ay, az, aw, bx, by, bz, bw, angle, start, per_ns = rows
     part = (since - start) * per_ns
     sine, cosine = _sine_cosine(part * angle)
@@ -218,23 +219,25 @@ def _poses(cache: TimeCache, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[
     )
 
 
-def _stretches(at: Stamps, samples: Floats) -> Floats:
+def _stretches(stamps: Stamps, samples: Floats) -> Floats:
     """Return 17 rows with a column for each interval between samples.
 
-    Position at its start, and the displacement to its end; quaternion at its start, and the
-    orthogonal one towards which it turns the short way; the angle; nanoseconds from the first
-    sample; 1 over its length.
+    The rows are the position at the start, the displacement to the end, the quaternion at the
+    start, the orthogonal quaternion towards which it rotates the short way, the angle, the
+    nanoseconds since the first sample, and the inverse of the interval's length.
     """
     begin, end = samples[:, :-1], samples[:, 1:]
     dot = (begin[3:] * end[3:]).sum(axis=0)
     to = np.where(dot < 0, -end[3:], end[3:]) - begin[3:] * np.abs(dot)
     sine = np.sqrt((to * to).sum(axis=0))
     to /= np.where(sine == 0, 1.0, sine)
-    steps = np.diff(at)
+    steps = np.diff(stamps)
     per_ns = 1 / np.where(steps == 0, np.inf, steps)
-    rest = np.stack([np.arctan2(sine, np.abs(dot)), (at[:-1] - at[0]).astype(np.float64), per_ns])
+    rest = np.stack(
+        [np.arctan2(sine, np.abs(dot)), (stamps[:-1] - stamps[0]).astype(np.float64), per_ns]
+    )
     rows = np.concatenate([begin[:3], end[:3] - begin[:3], begin[3:], to, rest])
-    if steps[-1] == 0:  # of two newest samples the last counts
+    if steps[-1] == 0:  # of two newest samples with the same time, the last counts
         rows[:3, -1], rows[6:10, -1] = samples[:3, -1], samples[3:, -1]
     return rows
 
@@ -242,7 +245,7 @@ def _stretches(at: Stamps, samples: Floats) -> Floats:
 def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
     """Return sine and cosine; for small angles by a series that is three times faster.
 
-    The first omitted term is below the rounding of a double.
+    The first omitted term is below the rounding error of a double.
     """
     if len(angles) == 0 or max(angles.max(), -angles.min()) > _SMALL:
         return np.sin(angles), np.cos(angles)
@@ -254,10 +257,10 @@ def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def transform_points_array(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
-    """Return points in the parent's frame from points in the child's.
+    """Return points in the parent's frame from points in the child's frame.
 
-    ``points`` has the shape (…, 3), in metres, and so has the result. float32 and float64 keep
-    their type, other numbers become float64; the computation uses float64. NaN stays NaN.
+    ``points`` and the result have the shape (…, 3), in metres. float32 and float64 keep their
+    type, and other numbers become float64. The computation uses float64. NaN stays NaN.
 
     Raises:
         InvalidArgumentException: if the last dimension is not 3.
@@ -277,7 +280,10 @@ def transform_points_array(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
 
 
 def rotation_and_translation(pose: PoseTuple) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the matrix (3×3) and the vector that move rows of points: ``rows @ turn + shift``."""
+    """Return the matrix (3×3) and the vector that transform rows of points.
+
+    The result is ``rows @ matrix + vector``.
+    """
     x, y, z, qx, qy, qz, qw = pose
     return np.array(matrix_from_quat((qx, qy, qz, qw))).T.copy(), np.array((x, y, z))
 
@@ -314,8 +320,10 @@ def _column(cloud: Any, name: str, data: NDArray[np.uint8]) -> NDArray[Any]:
     """Return the values of a field as an array of height × width, a view of ``data``."""
     field = next((each for each in cloud.fields if each.name == name), None)
     if field is None:
-        there = ", ".join(each.name for each in cloud.fields) or "none"
-        raise InvalidArgumentException(f"the cloud has no field {name}; its fields are: {there}")
+        field_names = ", ".join(each.name for each in cloud.fields) or "none"
+        raise InvalidArgumentException(
+            f"the cloud has no field {name}; its fields are: {field_names}"
+        )
     if field.datatype not in _FIELD_TYPES:
         raise InvalidArgumentException(
             f"the cloud's {name} is of type {field.datatype}, not float32 (7) or float64 (8)"
@@ -332,8 +340,8 @@ def _column(cloud: Any, name: str, data: NDArray[np.uint8]) -> NDArray[Any]:
         )
     size = sum(rows) * (cloud.height - 1) + cloud.width * cloud.point_step
     if cloud.height and size > len(data):
-        wanted = f"{cloud.height} × {cloud.width} points need {size}"
-        raise InvalidArgumentException(f"the cloud has {len(data)} bytes, and {wanted}")
+        need = f"{cloud.height} × {cloud.width} points need {size}"
+        raise InvalidArgumentException(f"the cloud has {len(data)} bytes, and {need}")
     shape = (cloud.height, cloud.width) if cloud.height and cloud.width else (0, 0)
     strides = (cloud.row_step, cloud.point_step)
     column: NDArray[Any] = np.ndarray(

@@ -1,6 +1,6 @@
 """tf2_ros's ``TransformBroadcaster`` and ``StaticTransformBroadcaster``.
 
-They send transforms on /tf and /tf_static, and need rclpy but not tf2_msgs.
+They publish transforms on /tf and /tf_static. They require rclpy, but not tf2_msgs.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 
 class TransformBroadcaster:
-    """Sends transforms of moving edges.
+    """Publishes transforms of moving edges.
 
     Args:
         node: an rclpy node.
-        qos: an rclpy QoSProfile or a depth; default tf2's: reliable, volatile, the last 100.
+        qos: an rclpy QoSProfile or a depth; by default tf2's: reliable, volatile, the last 100.
     """
 
     def __init__(self, node: Any, qos: Any = None) -> None:
@@ -34,16 +34,15 @@ class TransformBroadcaster:
 
 
 class StaticTransformBroadcaster:
-    """Sends transforms of fixed edges, latched.
+    """Publishes transforms of fixed edges, latched.
 
-    Each message has all transforms so far, because a latched topic keeps only the last message.
-
-    As in tf2_ros's Python, the first transform of a child frame stays; one with another parent or
-    pose is not sent, and the node's log says so.
+    Each message has all transforms so far, because a latched topic keeps only the last message. As
+    in tf2_ros for Python, the first transform of a child frame stays. A transform of the child
+    with another parent or pose is not published, and the node's log reports it.
 
     Args:
         node: an rclpy node.
-        qos: an rclpy QoSProfile or a depth; default tf2's: reliable, transient local, the last
+        qos: an rclpy QoSProfile or a depth; by default tf2's: reliable, transient local, the last
             message.
     """
 

@@ -1,18 +1,18 @@
-"""tf2_ros's ``Buffer`` in Python, with tf2's names and calling conventions; it needs no ROS.
+"""tf2_ros's ``Buffer`` in Python, with tf2's names and calling conventions, without ROS.
 
-``Buffer`` answers as tf2's does (geometry2 for ROS 2 Jazzy): a frame has one parent at a time,
-that of its newest sample; samples are kept for 10 s before the newest of their edge; between two
-samples positions are interpolated linearly and rotations on the great circle; time 0 asks for the
-newest time that all moving edges have reached; fixed edges hold at any time. It differs on purpose
-in these:
+``Buffer`` answers like tf2's (geometry2 for ROS 2 Jazzy). A frame has one parent at a time, the
+parent of its newest sample. Samples are kept for 10 s before the newest of their edge. Between two
+samples, positions are interpolated linearly and rotations on the great circle. Time 0 means the
+newest time that all moving edges have reached. Fixed edges are valid at any time. There are
+intended differences:
 
-- its exceptions say which edge is missing, or how many milliseconds too early or too late the time
-  is;
-- an infinite value is rejected like NaN, and a quaternion off unit length is rejected as tf2's log
-  says (Jazzy's ``BufferCore`` normalises before it checks, so that it rejects only a quaternion of
-  zeros);
-- of the two quaternions for a rotation it returns the one with w ≥ 0;
-- a chain of more than 1,000 edges is not a loop.
+- Exceptions name the missing edge, or tell by how many milliseconds the time is too early or too
+  late.
+- An infinite value is rejected like NaN. A quaternion without unit length is rejected, as tf2's
+  log claims. Jazzy's ``BufferCore`` normalises before it checks, so it rejects only a quaternion
+  of zeros.
+- Of the two quaternions for a rotation, the buffer returns the one with w ≥ 0.
+- A chain of more than 1,000 edges does not count as a loop.
 
 Times are integer nanoseconds throughout.
 """
@@ -46,15 +46,15 @@ if TYPE_CHECKING:
 
 _Answer = TypeVar("_Answer")
 
-# Period at which a waiting buffer takes messages itself, in seconds.
+# Interval at which a waiting buffer takes messages itself, in seconds.
 _POLL_S = 0.005
 
 
 class BufferInterface:
-    """tf2_ros's ``BufferInterface``: moves objects with a header, using a subclass's lookups.
+    """tf2_ros's ``BufferInterface``: transforms objects with a header, with a subclass's lookups.
 
-    ``registration`` maps types to functions. It starts with PointStamped, Vector3Stamped,
-    PoseStamped, PoseWithCovarianceStamped, PolygonStamped and PointCloud2, which needs numpy.
+    ``registration`` maps types to functions. Initially it has PointStamped, Vector3Stamped,
+    PoseStamped, PoseWithCovarianceStamped, PolygonStamped and PointCloud2, which requires numpy.
     """
 
     def __init__(self) -> None:
@@ -67,9 +67,9 @@ class BufferInterface:
         timeout: Any = 0,
         new_type: type | None = None,
     ) -> Any:
-        """Return an object of the same type, or as a ``new_type``, in another frame.
+        """Return an object in another frame, with the same type or as a ``new_type``.
 
-        The time is that of its own stamp.
+        The time is the object's own stamp.
 
         Raises:
             TypeException: if its type is unknown, or no conversion to the new type is registered.
@@ -94,14 +94,14 @@ class BufferInterface:
         """Return an object in another frame at another time, through ``fixed_frame``.
 
         Raises:
-            TypeException: as ``transform`` does.
+            TypeException: as in ``transform``.
         """
         move = self.registration.get(type(object_stamped))
         header = object_stamped.header
-        found = self.lookup_transform_full(
+        transform = self.lookup_transform_full(
             target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout
         )
-        moved = move(object_stamped, found)
+        moved = move(object_stamped, transform)
         return moved if new_type is None else convert(moved, new_type)
 
     def lookup_transform(
@@ -111,7 +111,7 @@ class BufferInterface:
         time: Any,
         timeout: Any = 0,
     ) -> Any:
-        """Return the pose of the source frame in the target frame: for subclasses to define.
+        """Return the pose of the source frame in the target frame. Subclasses define this.
 
         Raises:
             NotImplementedException: always.
@@ -127,9 +127,9 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Any = 0,
     ) -> Any:
-        """Return the pose of the source frame at one time in the target frame at another.
+        """Return the pose of the source frame at a time in the target frame at another time.
 
-        For subclasses to define.
+        Subclasses define this.
 
         Raises:
             NotImplementedException: always.
@@ -143,7 +143,7 @@ class BufferInterface:
         time: Any,
         timeout: Any = 0,
     ) -> Any:
-        """Return whether ``lookup_transform`` would answer: for subclasses to define.
+        """Return whether ``lookup_transform`` would succeed. Subclasses define this.
 
         Raises:
             NotImplementedException: always.
@@ -159,25 +159,25 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Any = 0,
     ) -> Any:
-        """Return whether ``lookup_transform_full`` would answer: for subclasses to define."""
+        """Return whether ``lookup_transform_full`` would succeed. Subclasses define this."""
         raise NotImplementedException
 
 
 class Buffer(BufferCore, BufferInterface):
-    """tf2_ros's ``Buffer``: takes and gives messages, and waits.
+    """tf2_ros's ``Buffer``: accepts and returns messages, and can wait.
 
     Args:
         cache_time: how long samples are kept, a duration; default 10 s.
-        node: an rclpy node; when its clock goes back, all moving edges are dropped. (A listener
-            does that, too.) If tf2_msgs is installed, it offers the service ``tf2_frames``, which
-            view_frames calls.
+        node: an rclpy node. When its clock goes back, the buffer drops all moving edges. (A
+            listener drops them, too.) If tf2_msgs is installed, the node offers the service
+            ``tf2_frames``, which view_frames calls.
 
-    Lookups take and raise the same as ``BufferCore``'s (module ``core``), and can wait for
-    transforms that have not arrived.
+    Lookups have the arguments and exceptions of ``BufferCore`` (module ``core``). They can wait
+    for transforms that have not arrived yet.
 
-    A program that has loaded rclpy gets its ``Future``, for ``spin_until_future_complete`` and
-    coroutines that an executor runs. Any other program gets that of ``concurrent.futures``, and
-    coroutines for asyncio.
+    A program that has loaded rclpy gets rclpy's ``Future``, for ``spin_until_future_complete`` and
+    for coroutines that an executor runs. Any other program gets the ``Future`` of
+    ``concurrent.futures``, and coroutines for asyncio.
     """
 
     def __init__(self, cache_time: Any = None, node: Any = None) -> None:
@@ -188,7 +188,7 @@ class Buffer(BufferCore, BufferInterface):
         self._jumps: dict[int, Any] = {}
         if node is not None:
             self.follow_clock(node)
-            # Whoever has a node has ROS.
+            # A program with a node has ROS.
             from tfcompose.tf.ros.tf_listener import offer_frames  # noqa: PLC0415
 
             self.srv = offer_frames(node, self.all_frames_as_yaml)
@@ -197,7 +197,7 @@ class Buffer(BufferCore, BufferInterface):
 
     def follow_clock(self, node: Any) -> None:
         """Drop moving edges whenever the node's clock jumps back or changes its source."""
-        # Whoever has a node has ROS.
+        # A program with a node has ROS.
         from tfcompose.tf.ros.tf_listener import on_clock_jump  # noqa: PLC0415
 
         clock = node.get_clock()
@@ -213,10 +213,10 @@ class Buffer(BufferCore, BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0
     ) -> Any:
-        """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
+        """Return the pose of ``source_frame`` in ``target_frame`` as a TransformStamped.
 
-        It takes coordinates in the source frame to the target frame. The stamp is the given time,
-        or the time that 0 resolves to. ``timeout`` is how long to wait for the transform.
+        The pose maps coordinates in the source frame to the target frame. The stamp is the given
+        time, or the time that 0 resolves to. ``timeout`` is the maximum wait for the transform.
         """
         time_ns = nanoseconds(time)
         if timeout == 0:
@@ -236,7 +236,7 @@ class Buffer(BufferCore, BufferInterface):
         fixed_frame: str,
         timeout: Any = 0,
     ) -> Any:
-        """Return the pose of the source frame at one time in the target frame at another.
+        """Return the pose of the source frame at a time in the target frame at another time.
 
         ``fixed_frame`` is assumed not to move between the times. The stamp is the target's time.
         """
@@ -255,7 +255,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Any = 0,
         return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (tf2's)
     ) -> Any:
-        """Return whether ``lookup_transform`` would answer.
+        """Return whether ``lookup_transform`` would succeed.
 
         ``return_debug_tuple`` adds the reason.
         """
@@ -273,7 +273,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Any = 0,
         return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (the same)
     ) -> Any:
-        """Return whether ``lookup_transform_full`` would answer.
+        """Return whether ``lookup_transform_full`` would succeed.
 
         ``return_debug_tuple`` adds the reason.
         """
@@ -323,10 +323,10 @@ class Buffer(BufferCore, BufferInterface):
     def transform_points(
         self, cloud: ArrayLike, target: str, source: str, stamp: Any = 0
     ) -> NDArray[Any]:
-        """Return points given in ``source`` in ``target``, at a time (0: the newest common one).
+        """Return points given in ``source`` in ``target`` at a time (0: the newest common time).
 
-        Needs numpy. ``cloud`` is N×3, or of any shape (…, 3), in metres; so is the result. float32
-        stays float32.
+        This requires numpy. ``cloud`` has the shape N×3, or any shape (…, 3), in metres, and so
+        has the result. float32 stays float32.
 
         Raises:
             InvalidArgumentException: if the last dimension is not 3.
@@ -345,12 +345,12 @@ class Buffer(BufferCore, BufferInterface):
         stamps: ArrayLike,
         outside: Literal["raise", "nan"] = "raise",
     ) -> Trajectory:
-        """Return the poses of ``source`` in ``target`` at many times at once. Needs numpy.
+        """Return the poses of ``source`` in ``target`` at many times at once. Requires numpy.
 
-        ``stamps`` are N integers, nanoseconds; 0 is the newest common time. The result (``xyz``
-        N×3 in metres, ``quat_xyzw`` N×4) has ``matrices()`` (N×4×4); each row is the result of
-        ``lookup``. For a time outside an edge's samples, ``outside`` decides: raise
-        ``ExtrapolationException``, or return a row of NaN.
+        ``stamps`` are N integers in nanoseconds; 0 means the newest common time. The result has
+        ``xyz`` (N×3 in metres), ``quat_xyzw`` (N×4) and ``matrices()`` (N×4×4). Each row is the
+        result of ``lookup``. ``outside`` determines the result for a time outside an edge's
+        samples: an ``ExtrapolationException``, or a row of NaN.
 
         Raises:
             ImportError: if numpy is not installed.
@@ -370,10 +370,10 @@ class Buffer(BufferCore, BufferInterface):
         return None
 
     def _wait(self, attempt: Callable[[], _Answer], timeout: Any) -> _Answer:
-        """Return the answer as soon as there is one; on timeout raise the last exception.
+        """Return the answer as soon as there is one. After the timeout, raise the last exception.
 
-        If a listener has no thread, the waiting caller may be the one that spins its node, so this
-        takes the messages.
+        If a listener has no thread, the waiting caller may be the program's only spinner of the
+        node. So this method takes the messages.
         """
         end_ns = monotonic_ns() + nanoseconds(timeout)
         while True:
@@ -395,12 +395,12 @@ class Buffer(BufferCore, BufferInterface):
     def _future(self, attempt: Callable[[], Any]) -> Any:
         """Return a future that completes when the attempt succeeds, now or after a new transform.
 
-        An invalid frame name ends it with the exception.
+        An invalid frame name completes it with the exception.
         """
         if "rclpy.task" in sys.modules:
             future = sys.modules["rclpy.task"].Future()
         else:
-            # A program that only looks up does without.
+            # A program that only does lookups does not need it.
             from concurrent.futures import Future  # noqa: PLC0415
 
             future = Future()
@@ -408,7 +408,7 @@ class Buffer(BufferCore, BufferInterface):
         def check() -> None:
             with self._lock:
                 if check not in self.on_insert:
-                    return  # another thread was quicker, or it was cancelled
+                    return  # another thread has set it, or it was cancelled
                 try:
                     answer, error = attempt(), None
                 except InvalidArgumentException as wrong:

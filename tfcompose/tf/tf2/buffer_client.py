@@ -1,6 +1,6 @@
-"""tf2_ros's ``BufferClient``: looks transforms up in a buffer server's buffer.
+"""tf2_ros's ``BufferClient``: lookups in the buffer of a buffer server.
 
-It needs rclpy and tf2_msgs.
+It requires rclpy and tf2_msgs.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tfcompose.tf.tf2.exceptions import (
 )
 from tfcompose.tf.tf2.messages import nanoseconds
 
-# tf2_msgs/TF2Error: NO_ERROR is 0, and all else a TransformException.
+# tf2_msgs/TF2Error: NO_ERROR is 0, and any other number is a TransformException.
 _EXCEPTIONS = {
     1: LookupException,
     2: ConnectivityException,
@@ -29,14 +29,14 @@ _EXCEPTIONS = {
 
 
 class BufferClient(BufferInterface):
-    """Looks up by the action tf2_msgs/LookupTransform.
+    """Looks up transforms with the action tf2_msgs/LookupTransform.
 
     Another thread must spin the node meanwhile.
 
     Args:
         node: an rclpy node.
         ns: the action's name.
-        check_frequency: ignored, exists for compatibility with tf2; an answer returns at once.
+        check_frequency: ignored, for compatibility with tf2; an answer returns at once.
         timeout_padding: how much longer than a lookup's timeout its answer may take, a duration,
             or seconds as a float.
 
@@ -47,7 +47,7 @@ class BufferClient(BufferInterface):
     def __init__(
         self, node: Any, ns: str, check_frequency: float = 10.0, timeout_padding: Any = 2.0
     ) -> None:
-        # Whoever has a node has ROS.
+        # A program with a node has ROS.
         from tfcompose.tf.ros.tf_action import LookupAction  # noqa: PLC0415
 
         super().__init__()
@@ -65,8 +65,8 @@ class BufferClient(BufferInterface):
 
         Raises:
             TimeoutException: if there is no server, or it does not answer.
-            TransformException: if there is no such transform; the exceptions are those of
-                ``Buffer``.
+            TransformException: if there is no such transform; its subclasses as ``Buffer`` raises
+                them.
         """
         goal = self._action.goal(
             target_frame, source_frame, nanoseconds(time), nanoseconds(timeout)
@@ -82,10 +82,10 @@ class BufferClient(BufferInterface):
         fixed_frame: str,
         timeout: Any = 0,
     ) -> Any:
-        """Return the server's pose of the source frame at one time in the target frame at another.
+        """Return the server's pose of the source at a time in the target at another time.
 
         Raises:
-            TransformException: as ``lookup_transform`` does.
+            TransformException: as in ``lookup_transform``.
         """
         goal = self._action.goal(
             target_frame, source_frame, nanoseconds(source_time), nanoseconds(timeout)
@@ -96,7 +96,7 @@ class BufferClient(BufferInterface):
     def can_transform(
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0
     ) -> bool:
-        """Return whether ``lookup_transform`` would answer."""
+        """Return whether ``lookup_transform`` would succeed."""
         try:
             self.lookup_transform(target_frame, source_frame, time, timeout)
         except TransformException:
@@ -112,7 +112,7 @@ class BufferClient(BufferInterface):
         fixed_frame: str,
         timeout: Any = 0,
     ) -> bool:
-        """Return whether ``lookup_transform_full`` would answer."""
+        """Return whether ``lookup_transform_full`` would succeed."""
         try:
             self.lookup_transform_full(
                 target_frame, target_time, source_frame, source_time, fixed_frame, timeout

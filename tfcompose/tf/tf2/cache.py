@@ -1,9 +1,9 @@
-"""Cache of each edge's poses, and the chain of edges from one frame to another.
+"""Cache of each edge's poses, and the chain of edges from a frame to another frame.
 
-``TimeCache`` holds one frame's poses in its parent over time, as tf2's ``TimeCache`` and
-``StaticCache`` do. ``Chain`` is the product of the edges between two frames, with neighbouring
-fixed edges multiplied in advance; ``newest_chain`` and ``chain_at`` find it, as tf2's
-``BufferCore::walkToTopParent`` does.
+``TimeCache`` holds a frame's poses in its parent over time, like tf2's ``TimeCache`` and
+``StaticCache``. ``PoseChain`` is the product of the edges between two frames, with neighbouring
+fixed edges multiplied in advance. ``newest_chain`` and ``chain_at`` find it, like tf2's
+``BufferCore::walkToTopParent``.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ from tfcompose.tf.tf2.poses import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Mapping, Sequence
 
-#: Outcome of inserting a sample: too old; taken; or taken and changed a fixed pose or a parent.
+#: Result of inserting a sample: too old; accepted; or accepted with a change of a fixed pose or a
+#: parent.
 Outcome = Literal["old", "taken", "changed"]
 
-#: Seven doubles as an array holds them.
+#: Packs seven doubles as in an array.
 pack_pose = struct.Struct("7d").pack
 
 # Number of expired samples removed at a time.
@@ -44,16 +45,16 @@ _COMPACT = 256
 
 
 class TimeCache:
-    """The samples of one child frame, oldest first.
+    """The samples of a child frame, oldest first.
 
-    A static frame has a single one, valid at any time.
+    A static frame has a single sample, valid at any time.
 
-    ``parent`` is that of the newest sample, and empty if all samples were cleared; ``mixed``:
-    samples have different parents. Of samples with the same stamp only the first and the last
-    received are kept, because no answer depends on the others. ``repeated`` has all of them, by
-    stamp, so that a duplicate does not replace the last one. Times and poses are plain numbers,
-    seven for a pose, which takes a quarter of the memory of objects. Those before the index
-    ``start`` have expired.
+    ``parent`` is the parent of the newest sample; it is empty if all samples were cleared.
+    ``mixed``: samples have different parents. Of samples with the same stamp, only the first and
+    the last received are kept, because no answer depends on the others. ``repeated`` holds all of
+    them by stamp, so that a duplicate does not replace the last one. Times and poses are plain
+    numbers, seven for a pose, which take a quarter of the memory of objects. Samples before the
+    index ``start`` have expired.
     """
 
     __slots__ = (
@@ -101,8 +102,8 @@ class TimeCache:
     def append(self, stamp_ns: int, pose: bytes, cache_ns: int) -> bool:
         """Add the next sample of a moving edge with a single parent, and return True.
 
-        Else do nothing. ``pose`` comes from ``pack_pose``: an array takes it in a third of the
-        time of seven numbers.
+        Otherwise do nothing and return False. ``pose`` comes from ``pack_pose``. An array accepts
+        it in a third of the time of seven numbers.
         """
         stamps = self.stamps
         if self.static or self.mixed or not stamps or stamp_ns <= stamps[-1]:
@@ -117,7 +118,7 @@ class TimeCache:
     def insert(self, stamp_ns: int, parent: str, pose: PoseTuple, cache_ns: int) -> Outcome:
         """Insert a sample, as tf2 does.
 
-        First drops samples older than ``cache_ns`` before the newest so far.
+        First, samples that are more than ``cache_ns`` older than the newest sample are dropped.
         """
         if self.static:
             return self._replace(stamp_ns, parent, pose)
@@ -146,15 +147,15 @@ class TimeCache:
         return "taken"
 
     def pose(self, index: int) -> PoseTuple:
-        """Return the pose of one sample; −1 is the newest."""
+        """Return the pose of a sample; -1 is the newest."""
         x, y, z, qx, qy, qz, qw = self.poses[7 * index : 7 * index + 7 or None]
         return x, y, z, qx, qy, qz, qw
 
     def pose_at(self, stamp_ns: int) -> PoseTuple | None:
-        """Return the pose at that time (0: newest), interpolated between two samples.
+        """Return the pose at a time (0: newest), interpolated between two samples.
 
-        Between samples of two parents, the older sample holds. None: there is no sample before, or
-        none after.
+        Between samples with different parents, the older sample is valid. None if there is no
+        sample before the time, or none after.
         """
         stamps = self.stamps
         if self.static or not stamp_ns:
@@ -173,7 +174,7 @@ class TimeCache:
         return between(self.poses[7 * index - 7 : 7 * index + 7], part)
 
     def parent_at(self, stamp_ns: int) -> str:
-        """Return the parent of the pose from ``pose_at``; empty if that is None."""
+        """Return the parent of the pose from ``pose_at``; empty if there is no such pose."""
         if self.static or not stamp_ns:
             return self.parent
         stamps = self.stamps
@@ -197,13 +198,13 @@ class TimeCache:
     def _sort_in(self, stamp_ns: int, parent: str, pose: PoseTuple) -> None:
         end = bisect_right(self.stamps, stamp_ns, self.start)
         if end > self.start and self.stamps[end - 1] == stamp_ns:
-            known = self.repeated.setdefault(
+            entries = self.repeated.setdefault(
                 stamp_ns, {(self.parents[end - 1], self.pose(end - 1))}
             )
-            if (parent, pose) in known:
+            if (parent, pose) in entries:
                 return
-            known.add((parent, pose))
-            if len(known) > 2:  # noqa: PLR2004 (the first and the last so far)
+            entries.add((parent, pose))
+            if len(entries) > 2:  # noqa: PLR2004 (the first and the last so far)
                 self.poses[7 * end - 7 : 7 * end], self.parents[end - 1] = array("d", pose), parent
                 return
         self.stamps.insert(end, stamp_ns)
@@ -211,7 +212,7 @@ class TimeCache:
         self.parents.insert(end, parent)
 
     def _of_several_parents(self) -> Outcome:
-        """Check again whether all samples have one parent, and update the newest parent."""
+        """Check again whether all samples have the same parent, and update the newest parent."""
         before = self.parent, self.mixed
         self.parent = self.parents[-1]
         self.mixed = any(
@@ -226,8 +227,8 @@ class TimeCache:
         self.start = start
         if self.repeated:
             self.repeated = {
-                stamp_ns: known
-                for stamp_ns, known in self.repeated.items()
+                stamp_ns: entries
+                for stamp_ns, entries in self.repeated.items()
                 if stamp_ns >= limit_ns
             }
         if start > _COMPACT:
@@ -235,16 +236,16 @@ class TimeCache:
             self.start = 0
 
 
-#: A link: a fixed pose; or the samples of a moving edge, and whether it is passed from the parent
-#: to the child.
+#: A link: a fixed pose; or the samples of a moving edge, and whether the chain passes it from
+#: parent to child.
 Link = tuple[None, PoseTuple, bool] | tuple["TimeCache", None, bool]
 
 
 class PoseChain:
     """The pose of the source in the target as a product of links, starting at the source.
 
-    ``children`` are those of all edges. ``moving`` are the edges with samples over time. If there
-    are none, ``fixed`` is the pose, else None.
+    ``children`` are the child frames of all edges. ``moving`` are the edges with samples over
+    time. If there are none, ``fixed`` is the pose, otherwise None.
     """
 
     __slots__ = ("children", "fixed", "links", "moving")
@@ -260,7 +261,7 @@ class PoseChain:
         )
 
     def pose_at(self, stamp_ns: int) -> PoseTuple | None:
-        """Return the source's pose in the target at that time; None if an edge has none."""
+        """Return the source's pose in the target at a time, None if an edge has none."""
         if self.fixed is not None:
             return self.fixed
         pose = None
@@ -277,7 +278,7 @@ class PoseChain:
     def common_ns(self) -> int:
         """Return the newest time that all moving edges have reached, in nanoseconds.
 
-        0 if none moves, as in tf2.
+        0 if no edge moves, as in tf2.
         """
         return min((cache.stamps[-1] for cache in self.moving if cache.stamps[-1]), default=0)
 
@@ -301,7 +302,7 @@ def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> P
     """Return the chain between two frames by each frame's newest parent.
 
     Raises:
-        LookupException: if the frames above one lead back to it.
+        LookupException: if the frames above a frame form a loop.
         ConnectivityException: if the frames are in two trees.
     """
     up, down, tops = _meet(caches, target, source, lambda cache: cache.parent)
@@ -313,12 +314,13 @@ def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> P
 def chain_at(
     caches: Mapping[str, TimeCache], target: str, source: str, stamp_ns: int
 ) -> PoseChain:
-    """Return the chain between two frames by each frame's parent at that time.
+    """Return the chain between two frames by each frame's parent at a time.
 
-    If an edge without a pose at that time might continue the chain, that is the error, as in tf2.
+    If an edge without a pose at that time might continue the chain, the error names this edge, as
+    in tf2.
 
     Raises:
-        LookupException: if the frames above one lead back to it.
+        LookupException: if the frames above a frame form a loop.
         ConnectivityException: if the frames are in two trees.
         ExtrapolationException: if an edge between them has no pose at that time.
     """
@@ -377,7 +379,7 @@ def _climb(
 
 
 def outside(cache: TimeCache, stamp_ns: int) -> ExtrapolationException:
-    """Return the exception for a time outside the edge's samples; it says by how much."""
+    """Return the exception for a time outside the edge's samples, which tells by how much."""
     if not len(cache):
         return ExtrapolationException(
             "Lookup would require extrapolation",
@@ -411,7 +413,7 @@ def outside(cache: TimeCache, stamp_ns: int) -> ExtrapolationException:
 
 
 def no_common_time(moving: Sequence[TimeCache]) -> ExtrapolationException:
-    """Return the exception for edges whose samples have no common time; it names them."""
+    """Return the exception for edges whose samples have no common time, which names them."""
     behind = min(moving, key=lambda cache: cache.newest_ns)
     ahead = max(moving, key=lambda cache: cache.oldest_ns)
     gap = milliseconds(ahead.oldest_ns - behind.newest_ns)

@@ -1,10 +1,10 @@
-"""tf2_py's ``BufferCore``: a buffer that takes and gives messages, without waiting.
+"""tf2_py's ``BufferCore``: a buffer that accepts and returns messages, without waiting.
 
 Frames, times and durations have the types that tf2 accepts; see ``messages`` for times. All
 lookups raise
 
 - ``InvalidArgumentException`` if a name is empty or starts with a slash,
-- ``LookupException`` if a frame is unknown, or the frames above it lead back to it,
+- ``LookupException`` if a frame is unknown, or the frames above it form a loop,
 - ``ConnectivityException`` if two frames are in two trees,
 - ``ExtrapolationException`` if an edge between them has no samples around that time.
 """
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from tfcompose.tf.tf2.poses import PoseTuple
 
 _SECOND_NS = 1_000_000_000
-# tf2 divides by no less, so that a frame with one sample has a rate of 10,000.
+# tf2 divides by at least this, in seconds, so that a frame with a single sample has a rate of
+# 10,000.
 _SHORTEST_S = 100e-6
 
 
@@ -43,23 +44,23 @@ class BufferCore(PoseBuffer):
     # Transforms in.
 
     def set_transform(self, transform: Any, authority: str = "default_authority") -> None:
-        """Take a TransformStamped of a moving edge; drop one that tf2 would reject.
+        """Insert a TransformStamped of a moving edge. Drop it if tf2 would reject it.
 
-        ``set`` returns whether it was.
+        ``set`` returns whether it was rejected.
         """
         self.insert([_row(transform)], static=False, authority=authority)
 
     def set_transform_static(self, transform: Any, authority: str = "default_authority") -> None:
-        """Take a TransformStamped of a fixed edge; drop one that tf2 would reject."""
+        """Insert a TransformStamped of a fixed edge. Drop it if tf2 would reject it."""
         self.insert([_row(transform)], static=True, authority=authority)
 
     # Lookups.
 
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: Any) -> Any:
-        """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
+        """Return the pose of ``source_frame`` in ``target_frame`` as a TransformStamped.
 
-        It takes coordinates in the source frame to the target frame. The stamp is the given time,
-        or the time that 0 resolves to.
+        The pose maps coordinates in the source frame to the target frame. The stamp is the given
+        time, or the time that 0 resolves to.
         """
         pose, stamp_ns = self._pose(target_frame, source_frame, nanoseconds(time))
         return transform_stamped(target_frame, source_frame, stamp_ns, pose)
@@ -72,7 +73,7 @@ class BufferCore(PoseBuffer):
         source_time: Any,
         fixed_frame: str,
     ) -> Any:
-        """Return the pose of the source frame at one time in the target frame at another.
+        """Return the pose of the source frame at a time in the target frame at another time.
 
         ``fixed_frame`` is assumed not to move between the times. The stamp is the target's time.
         """
@@ -85,7 +86,7 @@ class BufferCore(PoseBuffer):
     def can_transform_core(
         self, target_frame: str, source_frame: str, time: Any
     ) -> tuple[bool, str]:
-        """Return whether ``lookup_transform_core`` would answer, and why not."""
+        """Return whether ``lookup_transform_core`` would succeed, and the reason if not."""
         return _possible(lambda: self.lookup_transform_core(target_frame, source_frame, time))
 
     def can_transform_full_core(
@@ -96,14 +97,14 @@ class BufferCore(PoseBuffer):
         source_time: Any,
         fixed_frame: str,
     ) -> tuple[bool, str]:
-        """Return whether ``lookup_transform_full_core`` would answer, and why not."""
+        """Return whether ``lookup_transform_full_core`` would succeed, and the reason if not."""
         query = target_frame, target_time, source_frame, source_time, fixed_frame
         return _possible(lambda: self.lookup_transform_full_core(*query))
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
-        """Return the newest time that all moving edges between the two have reached.
+        """Return the newest time that all moving edges between the frames have reached.
 
-        0 if none moves.
+        0 if no edge moves.
         """
         with self._lock:
             if target_frame == source_frame:
@@ -123,14 +124,14 @@ class BufferCore(PoseBuffer):
         reference_point: Sequence[float] = (0.0, 0.0, 0.0),
         reference_point_frame: str = "",
     ) -> Velocity:
-        """Return the velocity of one frame seen from another (``linear`` m/s, ``angular`` rad/s).
+        """Return the velocity of a frame in another frame (``linear`` m/s, ``angular`` rad/s).
 
-        It is the mean over ``averaging_interval`` around a time (0: up to the newest), as far as
-        samples go, with the axes of ``reference_frame``, default the observation frame. Linear is
-        the velocity of the tracking frame's origin, or of another point that moves with it. (tf2's
-        ``lookupVelocity`` returns the same if nothing rotates and the axes agree; if something
-        rotates, it mixes up the axes.) An interval that would begin before the epoch begins 10 µs
-        after it, as in tf2.
+        It is the mean over ``averaging_interval`` around a time (0: up to the newest), limited to
+        the available samples. Its axes are those of ``reference_frame``, by default the
+        observation frame. The linear velocity is that of the tracking frame's origin, or of
+        another point that moves with it. tf2's ``lookupVelocity`` returns the same if nothing
+        rotates and the axes agree. If something rotates, it mixes up the axes. An interval that
+        would begin before the epoch begins 10 µs after it, as in tf2.
 
         Raises:
             ValueError: if the interval is not positive.
@@ -223,16 +224,16 @@ class BufferCore(PoseBuffer):
         source_time: Any,
         fixed_frame: str,
     ) -> list[str]:
-        """Return the children of the edges from the source to the fixed frame and the target.
+        """Return the child frames of edges from the source to the fixed frame and the target.
 
-        If both times are equal, the path goes only to the fixed frame, as in tf2.
+        If both times are equal, the path ends at the fixed frame, as in tf2.
         """
         times = nanoseconds(source_time), nanoseconds(target_time)
         with self._lock:
-            found = self._chain_between(fixed_frame, source_frame, times[0]).children
+            children = self._chain_between(fixed_frame, source_frame, times[0]).children
             if times[0] == times[1]:
-                return list(found)
-            return [*found, *self._chain_between(target_frame, fixed_frame, times[1]).children]
+                return list(children)
+            return [*children, *self._chain_between(target_frame, fixed_frame, times[1]).children]
 
 
 def _row(transform: Any) -> Row:

@@ -1,7 +1,7 @@
 """tf2's exceptions and rejections of transforms, and their messages.
 
 The exceptions have tf2's names and hierarchy. Their messages begin like tf2's, because programs
-look for those words. Then they name the missing edge, or say by how many milliseconds a time is
+search for those words. Then they name the missing edge, or tell by how many milliseconds a time is
 too early or too late. The source of the wording is geometry2's buffer_core.cpp and cache.cpp
 (Jazzy).
 """
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
     from tfcompose.tf.tf2.poses import PoseTuple
 
-#: A quaternion whose squared length is off by this much is rejected.
+#: A quaternion is rejected if its squared length differs from 1 by more than this.
 DENORMALISED = 0.01
 
 
 class TransformException(Exception):
-    """Raised when there is no pose of one frame in another.
+    """There is no pose of a frame in another frame.
 
     Args:
         text: tf2's message.
-        detail: further explanation; tfcompose's commands print it alone.
+        detail: further explanation, which tfcompose's commands print without the message.
     """
 
     def __init__(self, text: str = "", detail: object = None) -> None:
@@ -47,34 +47,34 @@ class TransformException(Exception):
 
 
 class LookupException(TransformException):
-    """Raised when a frame is unknown, or the frames above one lead back to it."""
+    """A frame is unknown, or the frames above a frame form a loop."""
 
 
 class ConnectivityException(TransformException):
-    """Raised when two frames are in two trees."""
+    """Two frames are in two trees."""
 
 
 class ExtrapolationException(TransformException):
-    """Raised when an edge has no sample before, or after, the requested time."""
+    """An edge has no sample before, or after, the requested time."""
 
 
 class InvalidArgumentException(TransformException):
-    """Raised for empty frame names, leading slashes and untransformable messages."""
+    """A frame name is empty or has a leading slash, or a message cannot be transformed."""
 
 
 class TimeoutException(TransformException):
-    """Raised by ``BufferClient``; ``Buffer`` never raises it."""
+    """``BufferClient`` got no answer in time. ``Buffer`` never raises it."""
 
 
 class TypeException(Exception):
-    """Raised when a message of that type cannot be transformed.
+    """A message of this type cannot be transformed.
 
-    As in tf2 it is not a TransformException.
+    As in tf2, it is not a TransformException.
     """
 
 
 class NotImplementedException(Exception):
-    """Raised by a ``BufferInterface`` without lookups."""
+    """A ``BufferInterface`` does not implement lookups."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -83,7 +83,7 @@ class NotImplementedException(Exception):
 
 
 class Rejection(Enum):
-    """The reason why a transform was rejected; the values are the words of tf2's log."""
+    """The reason why a transform was rejected. The values are the texts of tf2's log."""
 
     SELF = "TF_SELF_TRANSFORM"
     NO_CHILD = "TF_NO_CHILD_FRAME_ID"
@@ -94,7 +94,7 @@ class Rejection(Enum):
 
     @property
     def text(self) -> str:
-        """The reason in plain words."""
+        """The reason as plain text."""
         return _REJECTIONS[self]
 
 
@@ -109,7 +109,7 @@ _REJECTIONS = {
 
 
 def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
-    """Return the first reason why tf2 rejects a transform, regardless of earlier ones.
+    """Return the first reason why tf2 rejects a transform, regardless of earlier transforms.
 
     The order of reasons is tf2's.
     """
@@ -133,15 +133,16 @@ def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
 class UnknownFrame:
     """Message for an unknown frame, with the nearest known name.
 
-    Computed only when it is read: with thousands of names that takes longer than all lookups of a
-    second, and a program that waits for a frame asks for it with every message.
+    It is computed only when it is read. With thousands of names, that takes longer than all
+    lookups of a second, and a program that waits for a frame gets the exception with every
+    message.
     """
 
     __slots__ = ("_frame", "_known")
 
-    def __init__(self, frame: str, known: Collection[str]) -> None:
+    def __init__(self, frame: str, frames: Collection[str]) -> None:
         self._frame = frame
-        self._known = tuple(known)
+        self._known = tuple(frames)
 
     def __str__(self) -> str:
         lowered = {name.lower(): name for name in sorted(self._known, reverse=True)}
@@ -154,11 +155,11 @@ class UnknownFrame:
         return repr(str(self))
 
 
-def unknown_frame(frame: str, argument: str, known: Collection[str]) -> LookupException:
-    """Return the exception for a frame that never appeared."""
+def unknown_frame(frame: str, argument: str, frames: Collection[str]) -> LookupException:
+    """Return the exception for a frame that has never appeared."""
     return LookupException(
         f'"{frame}" passed to lookupTransform argument {argument} does not exist',
-        UnknownFrame(frame, known),
+        UnknownFrame(frame, frames),
     )
 
 
@@ -173,19 +174,19 @@ def unusable_name(frame: str, argument: str) -> InvalidArgumentException:
 
 
 def connectivity_error(
-    known: Collection[str], target: str, source: str, tops: Sequence[str]
+    frames: Collection[str], target: str, source: str, tops: Sequence[str]
 ) -> ConnectivityException:
-    """Return the exception for two frames whose ancestors end at two ``tops``."""
+    """Return the exception for two frames whose ancestors end at different ``tops``."""
     return ConnectivityException(
         f"Could not find a connection between '{target}' and '{source}' because they are not part"
         " of the same tree",
-        two_trees(known, target, source, *tops),
+        two_trees(frames, target, source, *tops),
     )
 
 
-def two_trees(known: Collection[str], a: str, b: str, top_a: str, top_b: str) -> str:
-    """Return which trees the two frames are in."""
-    cleared = [top for top in (top_a, top_b) if top in known]
+def two_trees(frames: Collection[str], a: str, b: str, top_a: str, top_b: str) -> str:
+    """Return a sentence with the trees of the two frames."""
+    cleared = [top for top in (top_a, top_b) if top in frames]
     if cleared:
         return (
             f"{a} and {b} are not connected: {cleared[0]} has had no parent since the buffer was"

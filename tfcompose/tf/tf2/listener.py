@@ -1,6 +1,6 @@
 """tf2_ros's ``TransformListener``: fills a buffer from /tf and /tf_static.
 
-It needs rclpy.
+It requires rclpy.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ class TransformListener:
 
     Args:
         buffer: the buffer to fill.
-        node: an rclpy node; spinning it feeds the buffer. None: the listener makes a node with a
+        node: an rclpy node; spinning it feeds the buffer. None: the listener creates a node with a
             thread.
-        spin_thread: spin the given node in a thread of the listener.
-        qos: an rclpy QoSProfile or a depth for /tf; default tf2's: reliable, volatile, the last
+        spin_thread: whether a thread of the listener spins the given node.
+        qos: an rclpy QoSProfile or a depth for /tf; by default tf2's: reliable, volatile, the last
             100.
-        static_qos: the same for /tf_static; default tf2's: reliable, transient local, the last
+        static_qos: the same for /tf_static; by default tf2's: reliable, transient local, the last
             100.
         tf_topic: the topic of moving edges.
         tf_static_topic: the topic of fixed edges.
-        static_only: listen only to fixed edges.
+        static_only: whether to listen only to fixed edges.
         namespace: listen to /NAMESPACE/tf and /NAMESPACE/tf_static instead.
-        use_sim_time: the listener's own node follows /clock; a given node has its own parameter.
+        use_sim_time: whether the listener's own node follows /clock; a given node has its own
+            parameter.
 
-    When a node's clock goes back, as a simulator's or a bag's does, the buffer drops all moving
-    edges, and the node's log says so. Rejected transforms are logged once for each frame and
-    reason.
+    When a node's clock goes back, for example at the restart of a simulation or a bag, the buffer
+    drops all moving edges, and the node's log reports it. Rejected transforms are logged once for
+    each frame and reason.
 
     Raises:
         RosError: if rclpy is not installed or cannot be used.
@@ -85,14 +86,14 @@ class TransformListener:
             self._ros = NodeListener(node, self._take, topics, spin=spin_thread)
             buffer.follow_clock(node)
             buffer.pollers.append(self._ros.poll)
-        self._end = weakref.finalize(self, self._ros.close)  # at the latest when the program ends
+        self._end = weakref.finalize(self, self._ros.close)  # when the program ends, at the latest
 
     def unregister(self) -> None:
-        """End the subscriptions; tf2's name for ``close``."""
+        """Stop the subscriptions; tf2's name for ``close``."""
         self.close()
 
     def close(self) -> None:
-        """End the subscriptions, and the listener's own thread and node.
+        """Stop the subscriptions, and the listener's own thread and node.
 
         The buffer keeps its content.
         """

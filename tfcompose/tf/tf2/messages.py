@@ -1,14 +1,14 @@
-"""Messages in and out of a buffer: times, TransformStamped, and transforms of other messages.
+"""Messages of a buffer: times, TransformStamped, and transforms of other messages.
 
-A program that has loaded ROS's geometry_msgs gets its ``TransformStamped``, which it may publish.
-Any other program gets the classes of this module, which have the same fields. A time is an object
-with ``nanoseconds`` (rclpy's ``Time`` and ``Duration``) or with ``sec`` and ``nanosec`` (the
-messages), or a plain int of nanoseconds.
+A program that has loaded ROS's geometry_msgs gets ROS's ``TransformStamped``, which it can
+publish. Any other program gets the classes of this module, which have the same fields. A time is
+an object with ``nanoseconds`` (rclpy's ``Time`` and ``Duration``) or with ``sec`` and ``nanosec``
+(the messages), or an int of nanoseconds.
 
 The ``do_transform_…`` functions are those of tf2_geometry_msgs and tf2_sensor_msgs. Each returns a
-new message of the same type, in the frame and with the stamp of the transform; everything else is
-copied from the given message. ``TransformRegistration`` and ``ConvertRegistration`` are tf2_ros's:
-a package registers its own type there as it would with tf2_ros, for the whole program.
+new message of the same type, with the frame and the stamp of the transform. Everything else is
+copied from the given message. ``TransformRegistration`` and ``ConvertRegistration`` are tf2_ros's.
+A package registers its own types there as with tf2_ros, for the entire program.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Maker = Callable[[str, str, int, PoseTuple], Any]
-    #: Moves an object by a TransformStamped.
+    #: Transforms an object by a TransformStamped.
     Move = Callable[[Any, Any], Any]
     Conversion = Callable[[Any], Any]
 
@@ -40,7 +40,7 @@ _SECOND_NS = 1_000_000_000
 def complete_rclpy() -> None:
     """Load rclpy's times if rclpy is loaded.
 
-    tf2_ros imports them, so programs use ``rclpy.time.Time`` after ``import rclpy`` alone.
+    tf2_ros imports them, so programs use ``rclpy.time.Time`` after only ``import rclpy``.
     """
     if sys.modules.get("rclpy"):
         import tfcompose.tf.ros.rclpy_times  # noqa: F401, PLC0415 (ROS is optional)
@@ -126,7 +126,7 @@ def nanoseconds(time: Any) -> int:
 
 
 def time_of(stamp_ns: int) -> Any:
-    """Return rclpy's ``Time`` if the program has loaded it, else this module's."""
+    """Return rclpy's ``Time`` if the program has loaded it, otherwise this module's."""
     rclpy_time = sys.modules.get("rclpy.time")
     if rclpy_time is not None:
         return rclpy_time.Time(nanoseconds=stamp_ns)
@@ -155,9 +155,9 @@ def _plain_message(target: str, source: str, stamp_ns: int, pose: PoseTuple) -> 
 
 
 def _ros_maker() -> Maker:
-    """Return the function that makes ROS's message.
+    """Return the function that creates ROS's message.
 
-    It sets fields directly if that gives the same as the constructor.
+    It sets fields directly if the result equals that of the constructor.
     """
     slow = _by_constructor()
     try:
@@ -184,7 +184,7 @@ def _by_constructor() -> Maker:
 
 
 def _by_fields() -> Maker:
-    """Return a maker of rosidl's Python messages (Jazzy) that skips default values."""
+    """Return a function that creates rosidl's Python messages (Jazzy) without default values."""
     module = sys.modules["geometry_msgs.msg"]
     empty = module.TransformStamped()
     classes: tuple[Any, Any, Any] = (type(empty), type(empty.header), type(empty.header.stamp))
@@ -215,7 +215,7 @@ def _by_fields() -> Maker:
     return make
 
 
-# Messages in another frame, as tf2_geometry_msgs and tf2_sensor_msgs do it.
+# Transforms of messages, as in tf2_geometry_msgs and tf2_sensor_msgs.
 
 
 def do_transform_point(point: Any, transform: Any) -> Any:
@@ -240,15 +240,15 @@ def do_transform_pose(pose: Any, transform: Any) -> Any:
     A quaternion of zeros counts as no rotation.
     """
     moved = deepcopy(pose)
-    at, rotation = moved.position, moved.orientation
+    position, rotation = moved.position, moved.orientation
     length = hypot(rotation.x, rotation.y, rotation.z, rotation.w)
     quat = (
         tuple(part / length for part in (rotation.x, rotation.y, rotation.z, rotation.w))
         if length
         else (0.0, 0.0, 0.0, 1.0)
     )
-    numbers = (at.x, at.y, at.z, quat[0], quat[1], quat[2], quat[3])
-    at.x, at.y, at.z, rotation.x, rotation.y, rotation.z, rotation.w = unit(
+    numbers = (position.x, position.y, position.z, quat[0], quat[1], quat[2], quat[3])
+    position.x, position.y, position.z, rotation.x, rotation.y, rotation.z, rotation.w = unit(
         product(pose_of(transform), numbers)
     )
     return moved
@@ -296,7 +296,7 @@ def transform_covariance(covariance: Sequence[float], transform: Any) -> list[fl
 
 
 def transform_points(point_cloud: ArrayLike, transform: Any) -> NDArray[Any]:
-    """Return points, N×3 in m, moved by a transform, as tf2_sensor_msgs does. Needs numpy.
+    """Return points, N×3 in m, transformed as in tf2_sensor_msgs. Requires numpy.
 
     Raises:
         InvalidArgumentException: if the last dimension is not 3.
@@ -319,10 +319,11 @@ def do_transform_polygon_stamped(polygon: Any, transform: Any) -> Any:
 
 
 def do_transform_cloud(cloud: Any, transform: Any) -> Any:
-    """Return a PointCloud2 in the transform's frame: x, y and z moved, all other bytes unchanged.
+    """Return a PointCloud2 in the transform's frame.
 
-    The fields may have any order, offsets, padding and byte order, and be float32 or float64; the
-    cloud may be organised and contain NaN. The time stays the cloud's. Needs numpy.
+    The function transforms x, y and z, and keeps the other bytes. The fields may have any order,
+    offsets, padding and byte order, and be float32 or float64. The cloud may be organised and
+    contain NaN. The stamp stays the cloud's. Requires numpy.
 
     Raises:
         InvalidArgumentException: if there is no x, y or z of such a type, or less data than the
@@ -337,7 +338,8 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
     return moved
 
 
-#: Functions of ``Buffer.transform`` by the name of the message type; ``registration`` adds others.
+#: Functions for ``Buffer.transform`` by the name of the message type. ``registration`` adds
+#: others.
 TRANSFORMS: dict[str, Callable[[Any, Any], Any]] = {
     "PointStamped": do_transform_point,
     "Vector3Stamped": do_transform_vector3,
@@ -349,7 +351,7 @@ TRANSFORMS: dict[str, Callable[[Any, Any], Any]] = {
 
 
 def require_numpy() -> None:
-    """Raise an ImportError that says what to install if numpy is missing."""
+    """Raise an ImportError that tells what to install if numpy is missing."""
     if find_spec("numpy") is None:
         raise ImportError(
             "many points or poses at once need numpy: pip install 'tfcompose[arrays]'"
@@ -359,7 +361,7 @@ def require_numpy() -> None:
 def pose_of(transform: Any) -> PoseTuple:
     """Return the pose of a TransformStamped, or of a Transform, as numbers.
 
-    Its quaternion is normalised; one of zeros counts as no rotation, as in tf2.
+    Its quaternion is normalised. A quaternion of zeros counts as no rotation, as in tf2.
     """
     inner = getattr(transform, "transform", transform)
     to, rotation = inner.translation, inner.rotation
@@ -370,7 +372,7 @@ def pose_of(transform: Any) -> PoseTuple:
 def _copy_with_header(headed: Any, stamp: Any) -> Any:
     """Return a copy of a message or header with the given stamp.
 
-    rclpy's ``Time`` cannot be copied, nor changed.
+    rclpy's ``Time`` can be neither copied nor changed.
     """
     return deepcopy(headed, {} if hasattr(stamp, "sec") else {id(stamp): stamp})
 
@@ -389,19 +391,19 @@ def _with_header_of(message: Any, transform: Any) -> Any:
     return copied
 
 
-# Which types can be moved, and converted into each other, as in tf2_ros.
+# Types that can be transformed, and converted into each other, as in tf2_ros.
 
 
 class TransformRegistration:
     """Functions that transform objects, by type.
 
-    Built-in messages are found by their type's name.
+    Functions for built-in messages are found by the type's name.
     """
 
     _moves: ClassVar[dict[type, Move]] = {}
 
     def add(self, key: type, callback: Move) -> None:
-        """Let ``Buffer.transform`` transform objects of a type.
+        """Register a function with which ``Buffer.transform`` transforms objects of a type.
 
         ``callback(object, transform)`` returns the transformed object.
         """
@@ -411,13 +413,13 @@ class TransformRegistration:
         """Return the function that transforms objects of a type.
 
         Raises:
-            TypeException: if there is none.
+            TypeException: if there is no such function.
         """
         move = self._moves.get(key) or TRANSFORMS.get(key.__name__)
         if move is None:
-            known = [*TRANSFORMS, *(each.__name__ for each in self._moves)]
+            names = [*TRANSFORMS, *(each.__name__ for each in self._moves)]
             raise TypeException(
-                f"a {key.__name__} cannot be transformed; what can is {', '.join(known)}"
+                f"a {key.__name__} cannot be transformed; what can is {', '.join(names)}"
             )
         return move
 
@@ -449,7 +451,7 @@ class ConvertRegistration:
         """Return the conversion to a message; for a message, the identity.
 
         Raises:
-            TypeException: if there is none.
+            TypeException: if there is no such conversion.
         """
         return self._to_msg.get(key) or _itself(key)
 
@@ -457,7 +459,7 @@ class ConvertRegistration:
         """Return the conversion of a message to this type.
 
         Raises:
-            TypeException: if there is none.
+            TypeException: if there is no such conversion.
         """
         return self._from_msg.get(key) or _itself(key)
 
@@ -465,7 +467,7 @@ class ConvertRegistration:
         """Return the conversion of the first type to the second.
 
         Raises:
-            TypeException: if there is none.
+            TypeException: if there is no such conversion.
         """
         if key not in self._direct:
             raise TypeException(f"nothing turns a {key[0].__name__} into a {key[1].__name__}")
@@ -475,7 +477,7 @@ class ConvertRegistration:
 def convert(a: Any, b_type: type) -> Any:
     """Return an object converted to another type.
 
-    Directly, as a copy, or through a message.
+    The object is converted directly, copied, or converted through a message.
 
     Raises:
         TypeException: if no such conversion is registered.

@@ -1,6 +1,6 @@
-"""The buffer without messages: takes transforms as plain numbers, and returns poses.
+"""The buffer without messages: accepts transforms as plain numbers, and returns poses.
 
-Frames are names, times are integer nanoseconds since the epoch, poses are
+Frames are names, times are integer nanoseconds since the epoch, and poses are
 ``tfcompose.foundation.geometry.Pose``.
 """
 
@@ -34,15 +34,16 @@ from tfcompose.tf.tf2.poses import IDENTITY, PoseTuple, product, unit
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-#: Time that samples are kept before the newest of their edge, as in tf2.
+#: Time in nanoseconds for which samples are kept before the newest sample of their edge, as in
+#: tf2.
 CACHE_NS = 10_000_000_000
-# Closer to 1 than this a sum of four squares cannot be told from 1.
+# A sum of four squares within this distance of 1 equals 1 within rounding.
 _ROUNDING = 1e-15
 # Maximum number of remembered chains.
 _MOST_CHAINS = 4096
 _SECOND_NS = 1_000_000_000
 
-#: One transform: parent, child, seconds, nanoseconds, x y z in metres, quaternion x y z w.
+#: A transform: parent, child, seconds, nanoseconds, x y z in metres, quaternion x y z w.
 Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
 
 
@@ -50,11 +51,12 @@ Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
 class FrameInfo:
     """A frame's edge to its parent.
 
-    Times are in nanoseconds since the epoch, and 0 for a fixed edge, which is valid at any time.
+    Times are in nanoseconds since the epoch. They are 0 for a fixed edge, which is valid at any
+    time.
     """
 
     name: str
-    #: Empty for a root, and for a moving frame after ``clear``.
+    #: The parent; empty for a root, and for a moving frame after ``clear``.
     parent: str
     static: bool
     #: The sender, as given to ``set`` or ``insert``.
@@ -66,7 +68,7 @@ class FrameInfo:
 
 
 class PoseBuffer:
-    """Takes transforms and returns the pose of one frame in another. Thread-safe.
+    """Accepts transforms and returns the pose of a frame in another frame. Thread-safe.
 
     Args:
         cache_ns: how long samples are kept, in nanoseconds before the newest of their edge.
@@ -82,10 +84,12 @@ class PoseBuffer:
         self._lock = RLock()
         self._inserted = Condition(self._lock)
         self._waiting = 0
-        #: Called after an insertion, in the inserting thread.
+        #: Functions to call after an insertion, in the inserting thread.
         self.on_insert: list[Callable[[], object]] = []
         self._caches: dict[str, TimeCache] = {}
         self._names: dict[str, None] = {}
+        #: Rises with each new frame, changed fixed pose and changed parent.
+        self.revision = 0
         self._chains: dict[tuple[str, str], PoseChain] = {}
         self._mixed: set[str] = set()
 
@@ -105,23 +109,24 @@ class PoseBuffer:
         static: bool,
         authority: str = "",
     ) -> bool:
-        """Take the pose of ``child`` in ``parent``; return False if tf2 would reject it."""
+        """Insert the pose of ``child`` in ``parent``. Return False if tf2 would reject it."""
         row = (parent, child, 0, stamp_ns, *pose.xyz, *pose.quat_xyzw)
         return not self.insert([row], static=static, authority=authority)
 
     def insert(
         self, rows: Iterable[Row], *, static: bool, authority: str = ""
     ) -> list[tuple[str, Rejection]]:
-        """Take transforms in order; return the child and the reason of each that was rejected.
+        """Insert transforms in order. Return the child and the reason for each rejected transform.
 
-        A leading slash is dropped from names, and quaternions are normalised. ``Rejection`` lists
-        the reasons, in the words of tf2's log; infinite values count as NaN.
+        A leading slash is removed from names, and quaternions are normalised. ``Rejection`` lists
+        the reasons, in the words of tf2's log. Infinite values count as NaN.
         """
         rejected: list[tuple[str, Rejection]] = []
         with self._lock:
             caches, cache_ns = self._caches, self.cache_ns
             for row in rows:
-                # The hot path, fifty thousand times a second: another sample of a known edge.
+                # The hot path, taken fifty thousand times a second: another sample of a known
+                # edge.
                 parent, child, sec, nsec, x, y, z, qx, qy, qz, qw = row
                 cache = caches.get(child)
                 if cache is not None and cache.parent == parent and cache.static is static:
@@ -142,8 +147,8 @@ class PoseBuffer:
         return rejected
 
     def _take(self, row: Row, *, static: bool, authority: str) -> Rejection | None:
-        """Take any transform; return why it was rejected."""
-        # tf2 strips one slash.
+        """Insert any transform. Return the reason if it is rejected."""
+        # tf2 strips a single slash.
         parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
         x, y, z, qx, qy, qz, qw = row[4:]
         reason = rejection_of(parent, child, (x, y, z, qx, qy, qz, qw))
@@ -169,14 +174,14 @@ class PoseBuffer:
     def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:
         """Return the pose of ``source`` in ``target`` at a time, and that time, in ns.
 
-        Time 0 is the newest that all moving edges between them have reached; if none moves it
-        stays 0. The quaternion's w is not negative. A frame in itself is the identity, even if it
-        is unknown.
+        Time 0 means the newest time that all moving edges between the frames have reached. If no
+        edge moves, it stays 0. The quaternion's w is not negative. The pose of a frame in itself
+        is the identity, even if the frame is unknown.
 
         Raises:
             InvalidArgumentException: if a name is empty or starts with a slash.
             LookupException: if a frame is unknown.
-            ConnectivityException: if they are in two trees.
+            ConnectivityException: if the frames are in two trees.
             ExtrapolationException: if an edge between them has no samples around that time.
         """
         (x, y, z, *quat), stamp_ns = self._pose(target, source, stamp_ns)
@@ -185,17 +190,17 @@ class PoseBuffer:
     def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
         """Return the same as ``lookup`` for time 0.
 
-        The time is None if all edges between the two are fixed.
+        The time is None if all edges between the frames are fixed.
         """
         pose, stamp_ns = self.lookup(target, source)
         return pose, stamp_ns or None
 
     def behind(self, target: str, source: str) -> str | None:
-        """Return the moving edge with the oldest newest sample, as "parent → child", or None.
+        """Return the moving edge whose newest sample is oldest, as "parent → child", or None.
 
         Raises:
             LookupException: if a frame is unknown.
-            ConnectivityException: if they are in two trees.
+            ConnectivityException: if the frames are in two trees.
         """
         with self._lock:
             moving = self._chain_between(target, source).moving if target != source else []
@@ -210,7 +215,7 @@ class PoseBuffer:
             return [_frame_info(name, self._caches.get(name)) for name in self._names]
 
     def clear(self) -> None:
-        """Drop all samples of moving edges; fixed ones and the names stay, as in tf2."""
+        """Drop all samples of moving edges. Fixed edges and names stay, as in tf2."""
         with self._lock:
             for cache in self._caches.values():
                 if not cache.static:
@@ -219,7 +224,7 @@ class PoseBuffer:
             self._mixed.clear()
 
     def can_lookup(self, target: str, source: str, stamp_ns: int = 0) -> str:
-        """Return an empty text if ``lookup`` would answer, else the reason."""
+        """Return the reason why ``lookup`` would fail; empty if it would succeed."""
         try:
             self._pose(target, source, stamp_ns)
         except TransformException as error:
@@ -227,11 +232,11 @@ class PoseBuffer:
         return ""
 
     def lock(self) -> RLock:
-        """Return a context in which no thread can add transforms."""
+        """Return a context in which no other thread can add transforms."""
         return self._lock
 
     def chain_for_all_times(self, target: str, source: str) -> PoseChain | None:
-        """Return the chain between two frames; None if a frame changed its parent.
+        """Return the chain between two frames, None if a frame has changed its parent.
 
         Raises:
             LookupException, ConnectivityException, InvalidArgumentException: as ``lookup`` for
@@ -267,7 +272,7 @@ class PoseBuffer:
     def _full_pose(
         self, target: str, target_ns: int, source: str, source_ns: int, fixed: str
     ) -> tuple[PoseTuple, int]:
-        """Return the source at one time in the target at another, and the target's motion."""
+        """Return the pose of the source at a time in the target at another time, and that time."""
         with self._lock:
             self._require(target, "target_frame")
             self._require(source, "source_frame")
@@ -277,9 +282,9 @@ class PoseBuffer:
         return unit(product(second, first)), stamp_ns
 
     def _pose_at(self, target: str, source: str, stamp_ns: int) -> PoseTuple:
-        """Return the pose by the parents of that time.
+        """Return the pose by the parents at that time.
 
-        In a loop of frames, the other direction may give it.
+        In a loop of frames, the pose may only be found in the opposite direction.
         """
         pose = chain_at(self._caches, target, source, stamp_ns).pose_at(stamp_ns)
         if pose is None:
@@ -289,7 +294,7 @@ class PoseBuffer:
         return pose
 
     def _chain_between(self, target: str, source: str, stamp_ns: int = 0) -> PoseChain:
-        """Return the chain between the two, and cache the one by newest parents if it exists."""
+        """Return the chain between the frames. The chain by newest parents is cached."""
         self._require(target, "target_frame")
         self._require(source, "source_frame")
         try:
@@ -310,12 +315,13 @@ class PoseBuffer:
             raise exceptions.unknown_frame(frame, argument, self._names)
 
     def _new_cache(self, child: str, *, static: bool) -> TimeCache:
-        """Return the samples of a frame that is new, or becomes fixed or moving."""
+        """Return the cache for a frame that is new, or becomes fixed or moving."""
         cache = self._caches[child] = TimeCache(child, static=static)
         return cache
 
     def _forget_chains(self, cache: TimeCache) -> None:
-        """Drop the chains, because an edge is new, or has another fixed pose or parent."""
+        """Drop cached chains, because an edge is new or has another fixed pose or parent."""
+        self.revision += 1
         self._chains.clear()
         (self._mixed.add if cache.mixed else self._mixed.discard)(cache.child)
 

@@ -1,8 +1,9 @@
 """Poses as seven plain numbers, for computations many times a second.
 
-x y z in metres, quaternion x y z w. ``tfcompose.foundation.geometry.Pose`` is the same arithmetic
-with a type; it normalises quaternions at every step, this module only at the end. The functions
-also accept numpy arrays for the numbers, and then compute many poses at once.
+The numbers are x y z in metres and the quaternion x y z w. ``tfcompose.foundation.geometry.Pose``
+has the same arithmetic with a type. It normalises quaternions at every step; this module does so
+only at the end. The functions also accept numpy arrays for the numbers, and then compute many
+poses at once.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ PoseTuple = tuple[float, float, float, float, float, float, float]
 
 IDENTITY: PoseTuple = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-# From here on the chord and the arc between two unit quaternions agree to the last bits.
+# Above this cosine, the chord and the arc between two unit quaternions agree to the last bits.
 _CHORD = 1 - 1e-9
 
 
 def product(a: PoseTuple, b: PoseTuple) -> PoseTuple:
-    """Return the pose of C in A from that of B in A and that of C in B."""
+    """Return the pose of C in A: the pose of B in A times the pose of C in B."""
     px, py, pz, ax, ay, az, aw = a
     x, y, z, bx, by, bz, bw = b
     tx, ty, tz = 2 * (ay * z - az * y), 2 * (az * x - ax * z), 2 * (ax * y - ay * x)
@@ -39,7 +40,7 @@ def product(a: PoseTuple, b: PoseTuple) -> PoseTuple:
 
 
 def inverse_product(a: PoseTuple, b: PoseTuple) -> PoseTuple:
-    """Return the pose of C in B, from those of B in A and of C in A."""
+    """Return the pose of C in B, from the poses of B in A and of C in A."""
     px, py, pz, ax, ay, az, aw = a
     x, y, z, bx, by, bz, bw = b
     x, y, z = x - px, y - py, z - pz
@@ -56,14 +57,14 @@ def inverse_product(a: PoseTuple, b: PoseTuple) -> PoseTuple:
 
 
 def inverse(a: PoseTuple) -> PoseTuple:
-    """Return the pose of A in B from that of B in A."""
+    """Return the pose of A in B from the pose of B in A."""
     return inverse_product(a, IDENTITY)
 
 
 def unit(a: PoseTuple) -> PoseTuple:
     """Return the pose with a quaternion of length 1 and w ≥ 0.
 
-    Of the two for one rotation, this is the shorter turn.
+    Of the two quaternions for a rotation, this is the one with the smaller angle.
     """
     x, y, z, qx, qy, qz, qw = a
     squared = qx * qx + qy * qy + qz * qz + qw * qw
@@ -74,7 +75,7 @@ def unit(a: PoseTuple) -> PoseTuple:
 
 
 def between(two: Sequence[float], part: float) -> PoseTuple:
-    """Return the pose at ``part`` (0 to 1) of the way between two, 14 numbers.
+    """Return the pose at the fraction ``part`` (0 to 1) between two poses, given as 14 numbers.
 
     Positions are interpolated linearly and rotations on the great circle, the short way (Shoemake,
     1985), as in tf2.

@@ -1,10 +1,10 @@
 """Rotations as Euler angles, quaternions and matrices: the functions of tf_transformations.
 
-This module needs numpy. A program replaces its import by ``from tfcompose.tf.tf2 import
-transformations as tf_transformations``. Quaternions are x y z w, angles in radians, matrices
-homogeneous, 4×4. ``axes`` names an order of rotations: ``s`` about the fixed (static) axes, ``r``
-about those that rotate with the frame, and three axes; ``sxyz``, the default, is roll, pitch and
-yaw as in URDF and tf2's ``setRPY``.
+This module requires numpy. A program replaces its import by ``from tfcompose.tf.tf2 import
+transformations as tf_transformations``. Quaternions are x y z w, angles are in radians, and
+matrices are homogeneous, 4×4. ``axes`` names an order of rotations: ``s`` for fixed (static) axes
+or ``r`` for axes that rotate with the frame, followed by three axes. The default ``sxyz`` is roll,
+pitch and yaw as in URDF and tf2's ``setRPY``.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     Numbers = Sequence[float] | Floats
 
 _AXES = "xyz"
-# Below this, a number is rounding: two rotations count as equal, or a rotation as the identity.
+# A number below this is a rounding error: two rotations count as equal, or a rotation as the
+# identity.
 _ROUNDING = 4 * np.finfo(float).eps
 
 
@@ -63,16 +64,16 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: str = "sxyz") -> Floats:
 
 
 def euler_from_matrix(matrix: ArrayLike, axes: str = "sxyz") -> Vector:
-    """Return the three angles of the matrix's rotation, 3×3 or 4×4.
+    """Return the three angles of the rotation in a matrix, 3×3 or 4×4.
 
-    The middle one is from 0 to π if the first axis is also the last, and from −π/2 to π/2
-    otherwise. At the ends of these ranges only the sum or the difference of the others is
-    determined; then the last one of fixed axes is 0, or the first one of rotating axes. (Shoemake,
-    Graphics Gems IV, 1994.)
+    The middle angle is from 0 to π if the first axis is also the last, otherwise from −π/2 to π/2.
+    At the ends of these ranges, only the sum or the difference of the other angles is determined.
+    Then the last angle for fixed axes, or the first for rotating axes, is 0. (Shoemake, Graphics
+    Gems IV, 1994.)
     """
     fixed, order = _order(axes)
     rotation = np.asarray(matrix, float)[:3, :3]
-    # Rotations about axes that rotate along are those about fixed axes in the opposite order.
+    # Rotations about rotating axes equal rotations about fixed axes in the opposite order.
     i, j, last = order if fixed else order[::-1]
     k = 3 - i - j
     sign = 1.0 if (i + 1) % 3 == j else -1.0
@@ -124,7 +125,7 @@ def quaternion_about_axis(angle: float, axis: Numbers) -> Quaternion:
 
 
 def quaternion_multiply(quaternion1: Numbers, quaternion0: Numbers) -> Quaternion:
-    """Return the product: the second rotation followed by the first. Nothing is normalised."""
+    """Return the product: the second rotation followed by the first, without normalisation."""
     a, b = _four(quaternion1), _four(quaternion0)
     x, y, z, w = product((0.0, 0.0, 0.0, *a), (0.0, 0.0, 0.0, *b))[3:]
     return x, y, z, w
@@ -144,7 +145,7 @@ def quaternion_inverse(quaternion: Numbers) -> Floats:
 def quaternion_slerp(
     quat0: Numbers, quat1: Numbers, fraction: float, spin: int = 0, shortestpath: bool = True  # noqa: FBT001, FBT002 (tf_transformations')
 ) -> Floats:  # fmt: skip
-    """Return the rotation at a fraction, 0 to 1, of the way from one to another.
+    """Return the rotation at a fraction, 0 to 1, between two rotations.
 
     ``spin`` adds half rotations.
     """
@@ -157,14 +158,14 @@ def quaternion_slerp(
     angle = acos(min(1.0, max(-1.0, dot))) + spin * np.pi
     if abs(abs(dot) - 1) < _ROUNDING or abs(angle) < _ROUNDING:
         return begin
-    found: Floats = (sin((1 - fraction) * angle) * begin + sin(fraction * angle) * end) / sin(
-        angle
-    )
-    return found
+    interpolated: Floats = (
+        sin((1 - fraction) * angle) * begin + sin(fraction * angle) * end
+    ) / sin(angle)
+    return interpolated
 
 
 def quaternion_matrix(quaternion: Numbers) -> Floats:
-    """Return the rotation as a matrix; a quaternion of zeros is no rotation."""
+    """Return the rotation as a matrix. A quaternion of zeros counts as no rotation."""
     quat = np.asarray(quaternion, float)
     length = np.linalg.norm(quat)
     matrix = np.identity(4)
@@ -210,8 +211,8 @@ def rotation_matrix(angle: float, direction: Numbers, point: Numbers | None = No
     """Return the rotation by an angle about an axis, through the origin or another point."""
     matrix = quaternion_matrix(quaternion_about_axis(angle, direction))
     if point is not None:
-        at = np.array(point[:3], float)
-        matrix[:3, 3] = at - matrix[:3, :3] @ at
+        origin = np.array(point[:3], float)
+        matrix[:3, 3] = origin - matrix[:3, :3] @ origin
     return matrix
 
 
@@ -223,10 +224,10 @@ def inverse_matrix(matrix: ArrayLike) -> Floats:
 
 def concatenate_matrices(*matrices: ArrayLike) -> Floats:
     """Return the product of the matrices, from left to right."""
-    found: Floats = np.identity(4)
+    product: Floats = np.identity(4)
     for matrix in matrices:
-        found = found @ np.asarray(matrix, float)
-    return found
+        product = product @ np.asarray(matrix, float)
+    return product
 
 
 def is_same_transform(matrix0: ArrayLike, matrix1: ArrayLike) -> bool:
@@ -241,8 +242,8 @@ def vector_norm(data: ArrayLike, axis: int | None = None) -> Any:
 
 
 def unit_vector(data: ArrayLike, axis: int | None = None) -> Floats:
-    """Return the array scaled to length 1, as a whole or along an axis."""
+    """Return the array scaled to length 1, as one vector or along an axis."""
     vector = np.array(data, float)
     length = np.linalg.norm(vector, axis=axis, keepdims=axis is not None)
-    found: Floats = vector / length
-    return found
+    unit: Floats = vector / length
+    return unit

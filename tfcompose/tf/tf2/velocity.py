@@ -1,4 +1,7 @@
-"""Mean velocity of one frame seen from another, from the poses at an interval's ends."""
+"""Mean velocity of a frame relative to another frame.
+
+The velocity follows from the poses at the start and the end of an interval.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +13,14 @@ from tfcompose.tf.tf2.poses import PoseTuple, product
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    #: Returns the pose of a frame, the second, in another, the first, at a time in nanoseconds; 0
-    #: is the newest.
+    #: Maps (target, source, time) to the pose of ``source`` in ``target``. The time is in
+    #: nanoseconds; 0 means the newest pose.
     PoseOf = Callable[[str, str, int], PoseTuple]
 
 Three = tuple[float, float, float]
 
-#: No mean begins earlier, in nanoseconds since the epoch, since time 0 asks for the newest; as in
-#: tf2.
+#: Earliest start of an interval, in nanoseconds since the epoch, as in tf2. It is not 0, because
+#: time 0 means the newest pose.
 _EARLIEST_NS = 10_000
 
 
@@ -31,12 +34,17 @@ class Velocity(NamedTuple):
 
 
 class VelocityQuery(NamedTuple):
-    """A velocity's subject, observer, axes, and the point that moves with the subject."""
+    """The velocity to compute, in the terms of tf2's ``lookupVelocity``."""
 
+    #: The moving frame.
     tracking_frame: str
+    #: The frame in which it moves.
     observation_frame: str
+    #: The frame that determines the axes of the result; empty for ``observation_frame``.
     reference_frame: str = ""
+    #: The point whose velocity is computed, attached to the moving frame: x y z in metres.
     reference_point: Sequence[float] = (0.0, 0.0, 0.0)
+    #: The frame of ``reference_point``; empty for ``tracking_frame``.
     reference_point_frame: str = ""
 
 
@@ -45,8 +53,8 @@ def mean_velocity(
 ) -> Velocity:
     """Return the mean velocity from ``begin_ns`` to ``end_ns``.
 
-    Axes and point are those at ``at_ns`` (0: newest). An interval that would begin before 10 µs
-    since the epoch begins there, and the mean is over the shorter time.
+    The axes and the reference point are those at ``at_ns`` (0: newest). An interval never begins
+    earlier than 10 µs after the epoch. An earlier ``begin_ns`` shortens the interval.
     """
     tracking, observation = moving.tracking_frame, moving.observation_frame
     begin_ns = max(begin_ns, _EARLIEST_NS)
@@ -66,7 +74,7 @@ def mean_velocity(
 
 
 def _angular_velocity(first: PoseTuple, last: PoseTuple, seconds: float) -> Three:
-    """Return the angular velocity of the short rotation from first to last, parent's axes."""
+    """Return the angular velocity of the shortest rotation, in the parent's axes."""
     ax, ay, az, aw = first[3:]
     *_, x, y, z, w = product((0.0, 0.0, 0.0, *last[3:]), (0.0, 0.0, 0.0, -ax, -ay, -az, aw))
     length = sqrt(x * x + y * y + z * z)

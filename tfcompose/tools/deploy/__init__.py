@@ -1,22 +1,23 @@
-"""Releases of a robot on its computers: copied over ssh, started and restarted by systemd.
+"""Deployment of a robot to its computers over ssh, as systemd units.
 
-Each host runs one unit per robot, ``tfcompose up plan.json --host NAME``, not one per process, as
-``export systemd`` writes them. Only then is there a launcher on the host: it starts in order and
-by readiness, restarts with a backoff, has one guard that sees every edge of every host, and
-answers ``ps``, ``logs``, ``events`` and ``wait``. A deployment reads from it which edges are live
-and needs no observer; units of single processes would leave it to guess. systemd starts the
-launcher at boot and after a failure, and ends everything in its control group.
+Each host runs a single unit for a robot, ``tfcompose up plan.json --host NAME``. ``export
+systemd`` writes a unit for each process instead. With a single unit, the host has a launcher. The
+launcher starts processes in order and by readiness, restarts them with a backoff, runs the guard,
+and answers ``ps``, ``logs``, ``events`` and ``wait``. A deployment asks the launcher for the live
+edges. With a unit for each process, it could not know them. systemd starts the launcher at boot
+and after a failure, and ends all processes in its control group.
 
-A release is a folder named by its content: files that a host already has are not sent again, and a
-second deployment changes nothing. It takes effect in two phases. On trial it is started from the
-runtime directory, which is empty after a reboot; only once every edge of every host is live does
-``current`` point to it. A host that loses power meanwhile, or its connection to the deploying
-computer, returns to the previous release without help. All hosts stop before any starts, because
-an edge may have moved from one host to another and must not have two publishers. If nothing of
-that kind changes, launchers keep running, follow the release, and restart only the processes that
-differ.
+A release is a folder whose name is a digest of its content. Therefore a deployment does not send a
+release that a host already has, and a second deployment changes nothing. A release starts on
+trial: a unit in the runtime directory, which is empty after a reboot, starts it. After every edge
+of every host is live, the link ``current`` points to the release. If a host loses power or its
+connection during the trial, it returns to the previous release by itself.
 
-``release`` makes the folder, ``unit`` the systemd unit, ``connection`` reaches the hosts,
-``agent`` acts there, ``following`` decides whether the robot can keep running, ``rollout`` runs
-the deployment.
+Normally all hosts stop before a host starts the new release. An edge may have moved from a host to
+another, and must not have two publishers. If no edge moves, the launchers keep running and restart
+only the processes that differ.
+
+``release`` makes the folder, and ``unit`` makes the systemd unit. ``connection`` connects to the
+hosts. ``agent`` runs on a host. ``following`` decides if the robot can keep running. ``rollout``
+runs the deployment.
 """

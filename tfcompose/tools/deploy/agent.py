@@ -1,13 +1,15 @@
-"""The agent of a deployment: it acts on a host.
+"""Agent of a deployment, which runs on a host.
 
-``connection`` sends this file's text over ssh to the host's Python, which runs it: it needs only
-the standard library, not tfcompose. It answers requests, one line of JSON each, in order, until
-its input ends. If the input ends while a release is on trial, the deploying computer is gone, and
-the agent returns to the previous release on its own.
+``connection`` sends the text of this file over ssh to the host's Python, which runs it. Therefore
+this file needs only the standard library and not tfcompose. The agent answers requests in order
+until its input ends. Each request is a line of JSON. If the input ends while a release is on
+trial, the connection to the deploying computer is lost, and the agent returns to the previous
+release.
 
-On the host, ``base`` holds ``releases/NAME``, the link ``current`` to the release that systemd
-starts, the link ``previous`` to the one before, and ``lock``. A release on trial is started by a
-drop-in (or, the first time, a unit) in the runtime directory, so that a host that loses power
+The folder ``base`` on the host contains the folders ``releases/NAME``, the links ``current`` and
+``previous``, and ``lock``. systemd starts the release ``current``; ``previous`` is the release
+before it. For a release on trial, the agent writes a drop-in into the runtime directory or, for
+the first release, a unit. This directory is empty after a reboot, so a host that loses power
 starts the previous release.
 """
 
@@ -41,7 +43,7 @@ UNIT_S, PROGRAM_S = 120.0, 60.0
 KEPT = 5
 #: The file in a release with the unit that starts it as the current release.
 UNIT = "unit"
-#: Larger files are not sent back to be compared.
+#: The maximum size of a text in bytes that the agent sends back for ``--diff``.
 MOST_TEXT = 200_000
 #: Program that prints the versions and variables of the host's Python, after sourcing the setup
 #: files; modules of the current folder come last.
@@ -61,16 +63,19 @@ print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env
 
 
 class HostError(Exception):
-    """Raised when something cannot be done on this host; the message gives the reason."""
+    """Raised if this host cannot carry out a request; the message contains the reason."""
 
 
 def digest_of(data: bytes) -> str:
-    """Return the content's digest, as in a manifest."""
+    """Return the digest of a file's content, as a manifest contains it."""
     return hashlib.sha256(data).hexdigest()
 
 
 class Agent:
-    """One robot's share on this host. ``settings`` are those of ``connection.Settings``."""
+    """Acts on the part of a robot that runs on this host.
+
+    ``settings`` has the fields of ``connection.Settings``.
+    """
 
     def __init__(self, settings: Mapping[str, Any], gone: threading.Event) -> None:
         self.name: str = settings["name"]
@@ -88,9 +93,9 @@ class Agent:
         runtime = Path(f"/run/user/{os.getuid()}")
         if "XDG_RUNTIME_DIR" not in os.environ and runtime.is_dir():
             os.environ["XDG_RUNTIME_DIR"] = str(runtime)
-        self._be_of(system=settings["system"])
+        self._set_scope(system=settings["system"])
 
-    def _be_of(self, *, system: bool) -> None:
+    def _set_scope(self, *, system: bool) -> None:
         """Use the folders of system units or of user units."""
         self.system = system
         home, runtime = Path.home(), Path(os.environ.get("XDG_RUNTIME_DIR", "/run"))
@@ -100,34 +105,38 @@ class Agent:
         self.units = Path("/etc/systemd/system") if system else home / ".config/systemd/user"
         self.runtime = Path("/run/systemd/system") if system else runtime / "systemd/user"
 
-    # Requests before anything changes.
+    # Requests that change nothing
+
+    def hostname(self) -> str:
+        """Return the host's name, which chooses the overlay of a single robot."""
+        return os.uname().nodename
 
     def probe(self) -> dict[str, Any]:
         """Return the host's Python, tfcompose, environment, systemd and folders."""
-        found: dict[str, Any] = {
+        facts: dict[str, Any] = {
             "tfcompose": None,
             "executable": sys.executable,
             "env": {},
         }
-        found["problems"] = []
+        facts["problems"] = []
         missing = [file for file in self.setup if not Path(file).expanduser().is_file()]
         if missing:
-            found["problems"].append(f"setup names {missing[0]}, which does not exist")
+            facts["problems"].append(f"setup names {missing[0]}, which does not exist")
         else:
             done = self._program([self._executable(), "-c", _PROBE])
             try:
-                found |= json.loads(done.stdout.splitlines()[-1])
+                facts |= json.loads(done.stdout.splitlines()[-1])
             except (ValueError, IndexError):
-                found["problems"].append(_last_line(done.stderr) or "its Python prints nothing")
+                facts["problems"].append(_last_line(done.stderr) or "its Python prints nothing")
         state = self._systemctl("is-system-running")
         if state.stdout.strip() in {"", "offline", "unknown"}:
             why = _last_line(state.stderr) or state.stdout.strip()
-            found["problems"].append(
+            facts["problems"].append(
                 f"systemd is not running{'' if self.system else ' for this user'}: {why}"
             )
         if self.system and os.getuid() != 0:
-            found["problems"].append("system units need root")
-        found |= {
+            facts["problems"].append("system units need root")
+        facts |= {
             "python": ".".join(map(str, sys.version_info[:3])),
             "base": str(self.base),
             "setup": [str(Path(file).expanduser()) for file in self.setup],
@@ -137,46 +146,50 @@ class Agent:
             ),
             "lingers": self.system or self._lingers(),
         }
-        return found
+        return facts
 
     def clock(self) -> float:
         """Return the time of this host's clock, in Unix seconds."""
         return time.time()
 
     def state(self) -> dict[str, Any]:
-        """Return the releases, the current one's digests, the unit, and the running release.
+        """Return the releases, the current release's digests, the unit, and the running release.
 
-        ``unsettled``: a trial was never ended, so the running release is not the current one.
+        ``unsettled`` is True if a trial was never ended. The running release is then not the
+        current release.
         """
         release = self._release("current")
-        shown = self._show_unit()
-        self.restarts = _restarts(shown)
-        status = self._status(shown)
+        unit = self._show_unit()
+        self.restarts = _restarts(unit)
+        status = self._status(unit)
         launcher = status["robot"]["launcher"] if status["robot"] else None
         return {
             "release": release,
             "previous": self._release("previous"),
             "files": self._manifest(release),
             "unit": _text(self.units / self.unit),
-            "active": shown.get("ActiveState") in {"active", "activating", "reloading"},
-            "enabled": shown.get("UnitFileState") == "enabled",
+            "active": unit.get("ActiveState") in {"active", "activating", "reloading"},
+            "enabled": unit.get("UnitFileState") == "enabled",
             "unsettled": (
                 (self.runtime / self.unit).exists() or (self.runtime / f"{self.unit}.d").exists()
             ),
-            "stranger": launcher if launcher and str(launcher) != shown.get("MainPID") else None,
+            "stranger": launcher if launcher and str(launcher) != unit.get("MainPID") else None,
             **status,
         }
 
     def texts(self, paths: list[str], *, any_size: bool = False) -> dict[str, str | None]:
         """Return the texts of files of the current release.
 
-        None for a file that is absent, too large, or not text.
+        The text is None if a file is missing, too large, or not text.
         """
         most = None if any_size else MOST_TEXT
         return {path: _text(self.base / "current" / path, most) for path in paths}
 
     def take_lock(self, who: str) -> dict[str, Any]:
-        """Take this host's lock until this process ends. If it is taken, name its holder."""
+        """Take the lock of this host until this process ends.
+
+        If another deployment has the lock, return who holds it.
+        """
         self.base.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(self.base / "lock", os.O_CREAT | os.O_RDWR, 0o600)
         try:
@@ -190,17 +203,17 @@ class Agent:
         self.lock = descriptor
         return {"holder": None}
 
-    # The new release.
+    # Requests for a new release
 
     def chunk(self, data: str) -> None:
-        """Take a chunk of a release's archive."""
+        """Append a chunk to the archive of a release."""
         if self.archive is None:
             self.base.mkdir(parents=True, exist_ok=True)
             self.archive = tempfile.TemporaryFile(dir=self.base)  # noqa: SIM115 (it lives until it is unpacked)
         self.archive.write(base64.b64decode(data))
 
     def unpack(self, release: str, *, wheels: bool) -> None:
-        """Unpack the archive into the release's folder, which appears only when complete.
+        """Unpack the archive; the release's folder gets its name only when it is complete.
 
         Raises:
             HostError: if no archive was sent, or the wheels cannot be installed.
@@ -240,29 +253,29 @@ class Agent:
         python = self._python_of(folder)
         done = self._program([*self._start(python), "rehearse", str(folder / "plan.json"), host])
         try:
-            found: list[dict[str, Any]] = json.loads(done.stdout.splitlines()[-1])
+            findings: list[dict[str, Any]] = json.loads(done.stdout.splitlines()[-1])
         except (ValueError, IndexError):
             raise HostError(
                 f"its tfcompose cannot check the plan: {_last_line(done.stderr)}"
             ) from None
-        return found
+        return findings
 
     def discard(self, release: str) -> None:
         """Remove a release that was not started."""
         if release not in {self._release("current"), self._release("previous")}:
             shutil.rmtree(self.base / "releases" / release, ignore_errors=True)
 
-    # The change itself.
+    # Requests that change the running release
 
     def stop(self) -> None:
         """Stop the running release."""
-        shown = self._show_unit()
-        self.trial = {"active": shown.get("ActiveState") in {"active", "activating", "reloading"}}
-        if shown.get("LoadState") == "loaded":
+        unit = self._show_unit()
+        self.trial = {"active": unit.get("ActiveState") in {"active", "activating", "reloading"}}
+        if unit.get("LoadState") == "loaded":
             self._must("stop", self.unit)
 
     def start(self, release: str) -> None:
-        """Start a release on trial, by a drop-in for the existing unit or by a new unit."""
+        """Start a release on trial, with a drop-in for the existing unit or with a new unit."""
         self.running = folder = self.base / "releases" / release
         unit = self._unit_of(release).replace(f"{self.base}/current/", f"{folder}/")
         if (self.units / self.unit).is_file():
@@ -279,9 +292,9 @@ class Agent:
         self._must("start", self.unit)
 
     def follow(self, release: str, host: str) -> str:
-        """Let the launcher follow a release on trial, and return its answer.
+        """Let the running launcher switch to a release on trial, and return its answer.
 
-        If the launcher cannot, stop it and start the release.
+        If the launcher cannot switch, stop it and start the release.
         """
         self.trial = {"active": True, "host": host}
         _write(
@@ -296,10 +309,10 @@ class Agent:
             return f"restarted: {error}"
 
     def _follow(self, release: str, host: str) -> str:
-        """Let the launcher follow a release, in which only built files may differ.
+        """Let the running launcher switch to a release that differs only in built files.
 
         Raises:
-            HostError: if it does not.
+            HostError: if the launcher does not switch.
         """
         folder = self._launched_folder()
         if folder is None:
@@ -324,8 +337,8 @@ class Agent:
         end = time.monotonic() + seconds
         while not self.gone.is_set():
             left = end - time.monotonic()
-            shown = self._show_unit()
-            if left <= 0 or shown.get("ActiveState") == "inactive" or self._has_failed(shown):
+            unit = self._show_unit()
+            if left <= 0 or unit.get("ActiveState") == "inactive" or self._has_failed(unit):
                 break
             argv = ["wait", "--ready", "--timeout", f"{left:.1f}", "--robot", self.name]
             begun = time.monotonic()
@@ -334,27 +347,27 @@ class Agent:
             self.gone.wait(min(0.3, max(left, 0)) if time.monotonic() - begun < left else 0)
         return self._status(self._show_unit())
 
-    def _status(self, shown: dict[str, str]) -> dict[str, Any]:
+    def _status(self, unit: dict[str, str]) -> dict[str, Any]:
         """Return the launcher's answer, or None and a failed unit's last lines."""
         done = self._tfcompose(["ps", "--format", "json", "--robot", self.name], PROGRAM_S)
         try:
             robots = json.loads(done.stdout)
         except ValueError:
             robots = []
-        failed = self._has_failed(shown)
+        failed = self._has_failed(unit)
         return {
             "robot": robots[0] if robots else None,
             "failed": failed,
             "lines": (
                 self._journal()
-                if failed or (not robots and shown.get("ActiveState") == "inactive")
+                if failed or (not robots and unit.get("ActiveState") == "inactive")
                 else []
             ),
         }
 
-    def _has_failed(self, shown: dict[str, str]) -> bool:
-        """Whether the unit has exited on its own since it was last examined or started here."""
-        return shown.get("ActiveState") == "failed" or _restarts(shown) > self.restarts
+    def _has_failed(self, unit: dict[str, str]) -> bool:
+        """Whether the unit has exited by itself since the agent last checked or started it."""
+        return unit.get("ActiveState") == "failed" or _restarts(unit) > self.restarts
 
     def commit(self, release: str) -> None:
         """Keep the release on trial: ``current`` now points to it."""
@@ -370,13 +383,13 @@ class Agent:
         self._prune()
 
     def settle(self) -> None:
-        """Make the commit final: the end of the input no longer reverts it."""
+        """Make the commit final, so that the end of the input no longer reverts it."""
         self.trial = None
 
     def back(self) -> dict[str, Any] | None:
         """Return to the release before the trial, and start it if it was running.
 
-        This also works after ``commit``. Return None if no release is on trial.
+        This also works after ``commit``, until ``settle``. Return None if no release is on trial.
         """
         trial, self.trial, self.running = self.trial, None, None
         if trial is None:
@@ -398,7 +411,10 @@ class Agent:
         return {"release": release, "active": bool(release and trial["active"])}
 
     def _return(self, release: str, host: str | None) -> None:
-        """Run the current release again; if the launcher only followed another, let it go back."""
+        """Run the current release again.
+
+        If the launcher switched to the other release while it ran, let it switch back.
+        """
         if host is not None:
             with contextlib.suppress(HostError):
                 self._follow(release, host)
@@ -408,18 +424,15 @@ class Agent:
             self._systemctl("stop", self.unit)
         self._must("start", self.unit)
 
-    # Other requests.
+    # Other requests
 
     def execute(self, argv: list[str]) -> None:
-        """Replace this process with tfcompose and these arguments, in the robot's environment.
-
-        Under the user's systemd, or the system's.
-        """
+        """Replace this process by tfcompose with these arguments, in the robot's environment."""
         system = (
             Path("/etc/systemd/system", self.unit).is_file()
             and not (self.units / self.unit).is_file()
         )
-        self._be_of(system=self.system or system)
+        self._set_scope(system=self.system or system)
         command = self._command([*self._start(self._python_of(self.base / "current")), *argv])
         os.execvpe(command[0], command, self._environment())  # noqa: S606 (no shell: these are words)
 
@@ -435,7 +448,7 @@ class Agent:
         self._must("daemon-reload")
 
     def _install(self, folder: Path) -> None:
-        """Install the release's wheels into a separate Python on top of the host's."""
+        """Install the release's wheels into a Python environment on top of the host's Python."""
         python = self._executable()
         wheels = sorted(map(str, (folder / "wheels").glob("*.whl")))
         for argv in (
@@ -461,11 +474,11 @@ class Agent:
         return str(Path(self.python).expanduser()) if "/" in self.python else self.python
 
     def _python_of(self, folder: Path) -> str:
-        own = folder / "venv/bin/python"
-        return str(own) if own.exists() else self._executable()
+        python_of_release = folder / "venv/bin/python"
+        return str(python_of_release) if python_of_release.exists() else self._executable()
 
     def _start(self, python: str) -> list[str]:
-        """Return the words that start tfcompose with that Python."""
+        """Return the command line that starts tfcompose with a Python."""
         return [python, "-c", self.program]
 
     def _command(self, argv: list[str]) -> list[str]:
@@ -482,7 +495,10 @@ class Agent:
         return self._program([*self._start(python), *argv], seconds)
 
     def _environment(self) -> dict[str, str]:
-        """Return the environment in which the run can be found: the unit's, over a login's."""
+        """Return the environment with which commands find the run.
+
+        It is the environment of a login, updated with the variables of the unit.
+        """
         if not self.system:
             return dict(os.environ)
         return {
@@ -511,8 +527,8 @@ class Agent:
         return {name: value for name, _, value in (line.partition("=") for line in lines)}
 
     def _journal(self) -> list[str]:
-        own = [] if self.system else ["--user"]
-        argv = ["journalctl", *own, "-u", self.unit, "-n", "12", "-o", "cat", "--no-pager"]
+        scope = [] if self.system else ["--user"]
+        argv = ["journalctl", *scope, "-u", self.unit, "-n", "12", "-o", "cat", "--no-pager"]
         return _run(argv, PROGRAM_S, dict(os.environ)).stdout.splitlines()
 
     def _lingers(self) -> bool:
@@ -538,7 +554,7 @@ class Agent:
         }
 
     def _launched_folder(self) -> Path | None:
-        """Return the folder of the running launcher's first plan, below which it gets files."""
+        """Return the folder of the running launcher's first plan, which contains its files."""
         pid = self._show_unit().get("MainPID") or "0"
         try:
             argv = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")
@@ -584,8 +600,8 @@ def _run(argv: list[str], seconds: float, env: dict[str, str]) -> subprocess.Com
         )
 
 
-def _restarts(shown: Mapping[str, str]) -> int:
-    return int(shown.get("NRestarts") or 0)
+def _restarts(unit: Mapping[str, str]) -> int:
+    return int(unit.get("NRestarts") or 0)
 
 
 def _last_line(text: str) -> str:
@@ -607,7 +623,7 @@ def _text(file: Path, most: int | None = MOST_TEXT) -> str | None:
 
 
 def _write(file: Path, text: str) -> None:
-    """Write the file atomically: readers see the old content or the new one."""
+    """Write a file atomically: readers see the old content or the new content."""
     file.parent.mkdir(parents=True, exist_ok=True)
     new = file.with_name(f".{file.name}.new")
     new.write_text(text, encoding="utf-8")
@@ -615,7 +631,7 @@ def _write(file: Path, text: str) -> None:
 
 
 def _link(link: Path, target: str) -> None:
-    """Point the link to the target atomically."""
+    """Point a link to a target atomically."""
     new = link.with_name(f".{link.name}.new")
     new.unlink(missing_ok=True)
     new.symlink_to(target)
@@ -625,6 +641,7 @@ def _link(link: Path, target: str) -> None:
 #: Names of the requests.
 _REQUESTS = (
     "probe",
+    "hostname",
     "clock",
     "state",
     "texts",
@@ -645,7 +662,7 @@ _REQUESTS = (
 
 
 def serve() -> None:
-    """Answer the requests on standard input until it ends, then revert a release on trial."""
+    """Answer requests on standard input until it ends; then revert a release on trial."""
     gone = threading.Event()
     requests: queue.Queue[bytes] = queue.Queue()
 

@@ -1,4 +1,4 @@
-"""``--all-hosts``: run a command on every host over ssh and print the results together."""
+"""Option ``--all-hosts``: run a command on every host over ssh, and print all results."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def run_on_all_hosts(
 ) -> int:
     """Run the command with these arguments on every host, and print the output.
 
-    Return the worst exit code. ``processes`` limits it to these processes and to hosts that run
-    any of them. Each line begins with its host. Objects of ``--format json`` have it as a key;
-    ``ps`` gives one list.
+    Return the highest exit code. ``processes`` limits the command to these processes and to hosts
+    that run them. Each line begins with its host. With ``--format json``, each object has the key
+    ``host``, and ``ps`` prints a single list.
 
     Raises:
-        SystemExit: after saying why there are no hosts.
+        SystemExit: after printing why there are no hosts.
     """
     if find_spec("asyncssh") is None:
         fail("--all-hosts needs the package asyncssh: pip install 'tfcompose[deploy]'", UNREADABLE)
@@ -42,17 +42,17 @@ def run_on_all_hosts(
         name: _of_host(plan, name, processes) for name in plan.hosts if name in hosts_of(plan)
     }
     commands = {}
-    for name, own in shares.items():
-        if own or not processes:
+    for name, share in shares.items():
+        if share or not processes:
             argv = [command, "--robot", f"{plan.robot}.{name}", *words]
-            commands[name] = [*argv, "--", *own] if own else argv
+            commands[name] = [*argv, "--", *share] if share else argv
     return asyncio.run(_run(plan, commands, printer))
 
 
 def _of_host(plan: Plan, host: str, processes: Sequence[str]) -> list[str]:
-    """Return those of the processes that a host may know.
+    """Return the processes that a host may run.
 
-    It knows what is unknown here, and says so.
+    Names that the plan does not contain go to every host, which then reports them.
     """
     elsewhere = {process.name for process in plan.processes if process.host not in (None, host)}
     return [name for name in processes if name not in elsewhere]
@@ -91,14 +91,14 @@ async def _run_on(plan: Plan, name: str, argv: list[str], printer: _HostPrinter)
     from tfcompose.tools.deploy.connection import ConnectedHost, connect_host, settings_of
 
     host = plan.hosts[name]
-    there = await connect_host(name, host, settings_of(plan.robot, name, host), None)
-    if not isinstance(there, ConnectedHost):
-        print_findings([there], sys.stderr)
+    connected_host = await connect_host(name, host, settings_of(plan.robot, name, host), None)
+    if not isinstance(connected_host, ConnectedHost):
+        print_findings([connected_host], sys.stderr)
         return FAILED
     try:
-        return await _print_output(there, argv, printer)
+        return await _print_output(connected_host, argv, printer)
     finally:
-        await there.close()
+        await connected_host.close()
 
 
 async def _print_output(host: ConnectedHost, argv: list[str], printer: _HostPrinter) -> int:
@@ -117,25 +117,28 @@ async def _print_output(host: ConnectedHost, argv: list[str], printer: _HostPrin
 
 
 def _object(line: str) -> dict[str, Any]:
-    """Return the JSON object on a line, empty for other lines."""
+    """Return the JSON object on a line; empty for other lines."""
     try:
-        found = json.loads(line)
+        value = json.loads(line)
     except ValueError:
-        found = None
-    return found if isinstance(found, dict) else {}
+        value = None
+    return value if isinstance(value, dict) else {}
 
 
 def _robots(text: str) -> list[Any]:
-    """Return the robots that a host lists, none where it prints something else."""
+    """Return the robots that a host lists; an empty list if its output is not such a list."""
     try:
-        found = json.loads(text)
+        robots = json.loads(text)
     except ValueError:
-        found = None
-    return found if isinstance(found, list) else []
+        robots = None
+    return robots if isinstance(robots, list) else []
 
 
 class _HostPrinter:
-    """What hosts print, as lines; a robot's table is printed at the end, in one piece."""
+    """Prints the output of hosts, each line with its host.
+
+    Tables of ``ps`` are printed at the end, host by host.
+    """
 
     def __init__(self, command: str, *, is_json: bool) -> None:
         self.width = 0
@@ -144,7 +147,7 @@ class _HostPrinter:
         self._kept: dict[str, list[str]] = {}
 
     def take(self, host: str, line: str) -> None:
-        """Print a line, or keep it."""
+        """Print a line, or keep it for the end."""
         if self._is_table:
             self._kept.setdefault(host, []).append(line)
         elif self._is_json and (event := _object(line)):
@@ -153,7 +156,7 @@ class _HostPrinter:
             self._put(f"{host.ljust(self.width)} | {printable(line)}")
 
     def end(self, hosts: list[str]) -> None:
-        """Print what was kept, host by host."""
+        """Print all kept lines, host by host."""
         lines = [self._kept.get(host, []) for host in hosts]
         if self._is_table and self._is_json:
             robots = [robot for some in lines for robot in _robots("\n".join(some))]

@@ -1,9 +1,9 @@
 """Copy a robot to its computers, and start it there.
 
 Build the robot once, copy it over ssh to every computer under hosts:, start it there as a systemd
-unit, and wait until every edge of every host is live. Otherwise return every host to the previous
-release. Files that a host already has are not copied again; a second run changes nothing. See
-tfcompose help hosts.
+unit, and wait until every edge of every host is live. If an edge does not become live, return
+every host to the previous release. A second run with the same files copies and changes nothing.
+See tfcompose help hosts.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_file, add_robot_overlay, add_variant, positive
+from tfcompose.cli.options import add_file, add_variant, positive
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, printable, reject
 
 if TYPE_CHECKING:
@@ -23,10 +23,9 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
+    """Add the arguments of ``deploy``."""
     add_file(parser)
-    add_variant(parser)
-    add_robot_overlay(parser)
+    add_variant(parser, robot="that of the hostname of static's host, if there is one")
     parser.add_argument(
         "--check", action="store_true", help="change nothing; exit 1 if something would change"
     )
@@ -76,7 +75,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Deploy; exit code 0, 1 on failure or a difference with --check, 2 if unreadable."""
+    """Deploy; exit code 0, 1 for a failure or a difference with --check, 2 if unreadable."""
     from importlib.util import find_spec
 
     from tfcompose.cli.compiling import compile_without_errors
@@ -93,13 +92,14 @@ def run(arguments: Namespace) -> int:
     wheels = Path(arguments.wheels) if arguments.wheels else None
     if wheels and not any(wheels.glob("*.whl")):
         fail(f"no wheels in {wheels}", UNREADABLE)
-    robot, _ = compile_without_errors(arguments.file, arguments)
     import asyncio
 
     from tfcompose.tools.deploy.release import pack_release
     from tfcompose.tools.deploy.rollout import target_of
 
     try:
+        arguments.overlay_robot = asyncio.run(_overlay_robot(arguments, arguments.overlay_robot))
+        robot, _ = compile_without_errors(arguments.file, arguments)
         places = {name: host.span for name, host in robot.hosts.items()}
         target = target_of(
             plan_of(robot.with_final_names()),
@@ -114,6 +114,43 @@ def run(arguments: Namespace) -> int:
         return asyncio.run(_deploy(target, release, arguments))
     except RejectedError as error:
         reject(error.findings)
+
+
+async def _overlay_robot(arguments: Namespace, named: str | None) -> str | None:
+    """Return the name of the overlay to merge.
+
+    This is ``named`` or, without it, the hostname of the computer that runs ``static``, if the
+    robot file has an overlay with this name.
+
+    Raises:
+        RejectedError: if the host cannot be reached, or a file cannot be read.
+    """
+    from tfcompose.cli.compiling import compile_file, load_robot, robots_of
+    from tfcompose.compiler.emit.plan import plan_of
+    from tfcompose.foundation.findings import Finding, RejectedError
+    from tfcompose.model.robot import STATIC
+    from tfcompose.tools.deploy.connection import hostname_of, settings_of
+
+    if named is not None or arguments.rollback:
+        return named
+    robots = robots_of(load_robot(arguments.file))
+    robot = compile_file(arguments.file, arguments).robot if robots else None
+    plan = plan_of(robot.with_final_names()) if robot else None
+    if robot is None or plan is None:
+        return None
+    names = [process.host for process in plan.processes if process.name == STATIC]
+    main = next((name for name in names if name in plan.hosts), None)
+    if main is None:
+        return None
+    host, span = plan.hosts[main], robot.hosts[main].span
+    settings = settings_of(plan.robot, main, host, system=arguments.system)
+    hostname = await hostname_of(main, host, settings, span)
+    if isinstance(hostname, Finding):
+        raise RejectedError([hostname])
+    if hostname not in robots:
+        return None
+    _report(f"{main}: {arguments.file} with the overlay of {hostname}")
+    return hostname
 
 
 async def _deploy(target: DeployTarget, release: Release | None, arguments: Namespace) -> int:
@@ -156,9 +193,9 @@ def _report(line: str) -> None:
 
 
 def _report_unchanged(rollout: Rollout) -> int:
-    """Say that the hosts have the release already, and what is not live there.
+    """Print that the hosts already run the release, and report edges that are not live.
 
-    Exit code 1 in that case.
+    Return exit code 1 if there are such edges.
     """
     print(f"nothing to change: {rollout.describe()}")
     findings = rollout.not_live()

@@ -1,4 +1,4 @@
-"""Connections to the hosts, by asyncssh. Each host runs the agent, which answers requests."""
+"""Connections to the agents on hosts, with asyncssh."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
     from tfcompose.model.plan import PlanHost
 
-#: The time limits in seconds to reach a host, and for its answer to a short request.
+#: The timeouts in seconds for a connection to a host, and for its answer to a short request.
 CONNECT_S, ANSWER_S = 10.0, 180.0
 #: The interval of keepalives in seconds, and the number of missed ones that ends a connection.
 ALIVE_EVERY_S, ALIVE_MISSES = 2.0, 3
-#: The number of clock readings. The quickest answer is used.
+#: The number of clock readings. The fastest answer is the most exact one.
 CLOCK_READINGS = 5
-#: What Python is started with: it runs as much of its input as the first line says.
+#: The program with which Python starts on a host. It reads a length from the first line of its
+#: input, then that many bytes, and runs them.
 START = (
     "import sys; sys.exit('Python %d.%d is older than 3.10' % sys.version_info[:2]) if"
     " sys.version_info < (3, 10) else"
@@ -40,17 +41,16 @@ START = (
 class Settings:
     """The agent's settings, sent before any request."""
 
-    #: ROBOT.HOST.
+    #: The name of the robot's part on the host: ROBOT.HOST.
     name: str
-    #: The unit's file name.
+    #: The file name of the unit.
     unit: str
     python: str = "python3"
     #: Setup files to source, in order.
     setup: tuple[str, ...] = ()
     #: Whether the unit belongs to the system's systemd instead of the user's.
     system: bool = False
-    #: The line of bash that sources the files before ``--`` and then executes the command after
-    #: it.
+    #: A line of bash. It sources the files before ``--`` and then executes the command after it.
     sourcing: str = SOURCING
     #: The Python code that starts tfcompose.
     program: str = ANYWHERE
@@ -59,14 +59,14 @@ class Settings:
 def agent_command(python: str) -> str:
     """Return the shell command that starts the agent.
 
-    It imports no module from a user's folder.
+    Python does not import modules from the user's folders.
     """
     program = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
     return f"exec {program} -I -c {shlex.quote(START)}"
 
 
 def agent_input(settings: Settings) -> bytes:
-    """Return the start of the agent's input: its program and its settings."""
+    """Return the beginning of the agent's input: its program and its settings."""
     agent = Path(__file__).with_name("agent.py").read_bytes()
     return f"{len(agent)}\n".encode() + agent + f"{json.dumps(asdict(settings))}\n".encode()
 
@@ -80,15 +80,15 @@ def settings_of(robot: str, name: str, host: PlanHost, *, system: bool = False) 
 
 
 class LostError(Exception):
-    """Raised when a host no longer answers; the message describes the symptom."""
+    """Raised if a host no longer answers; the message describes the symptom."""
 
 
 class RefusedError(Exception):
-    """Raised when a host cannot carry out a request; the message gives the reason."""
+    """Raised if a host cannot carry out a request; the message contains the reason."""
 
 
 class ConnectedHost:
-    """A connected host. ``span`` is its place in the robot file."""
+    """A connected host. ``span`` is its location in the robot file."""
 
     def __init__(
         self,
@@ -107,8 +107,8 @@ class ConnectedHost:
         """Return the agent's answer.
 
         Raises:
-            LostError: if the host does not answer any more.
-            RefusedError: if it cannot do it.
+            LostError: if the host no longer answers. RefusedError: if the host cannot carry out
+            the request.
         """
         async with self._order:
             try:
@@ -125,11 +125,9 @@ class ConnectedHost:
         return answer["answer"]
 
     async def _answer(self) -> dict[str, Any] | None:
-        """Return the next answer, None at the end; output of the login is skipped."""
+        """Return the next answer, or None at the end; skip output of the login shell."""
         line = b""
-        while (
-            part := await self._process.stdout.readline()
-        ):  # a part of a line that is longer than the window
+        while part := await self._process.stdout.readline():  # a part of a long line
             line += part
             if line.endswith(b"\n"):
                 with contextlib.suppress(ValueError):
@@ -140,25 +138,25 @@ class ConnectedHost:
         return None
 
     async def clock_offset_s(self) -> float:
-        """Return how far the host's clock is ahead of this one, in seconds.
+        """Return by how much the host's clock is ahead of this computer's clock, in seconds.
 
-        Measured with the quickest answer.
+        The value is from the fastest of several answers.
         """
         readings: list[tuple[float, float]] = []
         for _ in range(CLOCK_READINGS):
             before = time.time()
-            there: float = await self.ask("clock")
+            remote_s: float = await self.ask("clock")
             after = time.time()
-            readings.append((after - before, there - (before + after) / 2))
+            readings.append((after - before, remote_s - (before + after) / 2))
         return min(readings)[1]
 
     async def execute(self, argv: list[str]) -> asyncssh.SSHClientProcess[bytes]:
-        """Let the agent become tfcompose with these arguments, and return its process."""
+        """Replace the agent by tfcompose with these arguments, and return its process."""
         self._process.stdin.write(f'["execute", {json.dumps({"argv": argv})}]\n'.encode())
         return self._process
 
     async def close(self) -> None:
-        """End the agent, which reverts a release on trial, and the connection."""
+        """End the connection and the agent, which reverts a release on trial."""
         try:
             self._process.stdin.write_eof()
             await asyncio.wait_for(self._process.wait_closed(), ANSWER_S)
@@ -171,7 +169,7 @@ class ConnectedHost:
 async def connect_host(
     name: str, host: PlanHost, settings: Settings, span: Span | None
 ) -> ConnectedHost | Finding:
-    """Return the host with its agent, or the reason why it cannot be reached."""
+    """Connect to a host and start its agent; return a finding if this fails."""
     user, _, address = host.ssh.rpartition("@")
     options: dict[str, Any] = {"username": user} if user else {}
     options |= {"port": host.port} if host.port is not None else {}
@@ -210,8 +208,8 @@ async def connect_host(
             agent_command(python), encoding=None, window=2**21, max_pktsize=2**15
         )
         process.stdin.write(agent_input(settings))
-        there = ConnectedHost(name, connection, process, span)
-        await there.ask("clock", 2 * CONNECT_S)
+        connected_host = ConnectedHost(name, connection, process, span)
+        await connected_host.ask("clock", 2 * CONNECT_S)
     except (OSError, asyncssh.Error, LostError, RefusedError) as error:
         why = await _stderr_of(process) or str(error)
         connection.close()
@@ -222,7 +220,23 @@ async def connect_host(
             span,
             help=f"hosts: {{{name}: {{python: FILE}}}}, Python 3.10 or newer",
         )
-    return there
+    return connected_host
+
+
+async def hostname_of(
+    name: str, host: PlanHost, settings: Settings, span: Span | None
+) -> str | Finding:
+    """Return the hostname of a host, or a finding if it cannot be reached."""
+    connected_host = await connect_host(name, host, settings, span)
+    if isinstance(connected_host, Finding):
+        return connected_host
+    try:
+        hostname: str = await connected_host.ask("hostname")
+    except (LostError, RefusedError) as error:
+        return _unreachable(name, str(error), span)
+    finally:
+        await connected_host.close()
+    return hostname
 
 
 async def _stderr_of(process: asyncssh.SSHClientProcess[bytes]) -> str:

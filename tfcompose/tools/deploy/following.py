@@ -1,4 +1,4 @@
-"""Check whether the launchers of a plan can follow another one without a full restart."""
+"""Test whether running launchers can switch to another plan without a full restart."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 
 def can_follow(before: Plan, after: Plan) -> bool:
-    """Return whether the robot can keep running while hosts change plans one after another.
+    """Return whether the robot can keep running while its hosts switch plans one by one.
 
     It cannot in these cases:
 
-    - Processes or edges move between hosts: the old ones must end first.
-    - Frames vanish: buffers of running nodes would keep them.
+    - Processes or edges move between hosts: the old processes must end first.
+    - Frames disappear: buffers of running nodes would keep them.
     - Settings of all nodes change.
-    - A guard does more than report: it would act by one plan on a host that runs the other.
+    - A guard is strict or stops processes: it could act by the old plan on the new plan's edges.
     """
     if (before.robot, before.ros, before.guard) != (after.robot, after.ros, after.guard):
         return False
@@ -29,8 +29,8 @@ def can_follow(before: Plan, after: Plan) -> bool:
     hosts, places = _hosts(before), _places(before)
     if any(hosts.get(name, host) != host for name, host in _hosts(after).items()):
         return False
-    there = _places(after)
-    return all(there.get(child) == host for child, host in places.items())
+    places_after = _places(after)
+    return all(places_after.get(child) == host for child, host in places.items())
 
 
 def _hosts(plan: Plan) -> dict[str, str | None]:
@@ -38,15 +38,16 @@ def _hosts(plan: Plan) -> dict[str, str | None]:
 
 
 def _places(plan: Plan) -> dict[str, str | None]:
-    """Return the host that publishes each frame's parent edge."""
+    """Return the host that publishes the edge above each frame."""
     hosts = _hosts(plan)
     return {edge.child: hosts.get(edge.owner) for edge in plan.edges}
 
 
 def same_files(before: Mapping[str, str], after: Mapping[str, str]) -> bool:
-    """Return whether two releases, by their manifests, differ only in built files.
+    """Return whether two releases differ only in built files.
 
-    Which processes read the other files is unknown.
+    The arguments are the manifests of the releases. If other files differ, all processes must
+    restart, because it is unknown which processes read these files.
     """
     kinds = (f"{NAMED}/", f"{WHEELS}/")
     named = [

@@ -28,7 +28,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(command: str, arguments: Namespace) -> int | None:
-    """Run the command on all hosts; return the worst exit code. None without ``--all-hosts``."""
+    """Run the command on all hosts and return the highest exit code; None without the option."""
     if not arguments.all_hosts:
         if arguments.file:
             fail("--file goes with --all-hosts", UNREADABLE)
@@ -40,7 +40,7 @@ def run(command: str, arguments: Namespace) -> int | None:
 
 
 def _options(arguments: Namespace) -> list[str]:
-    """Return the options of the command itself, as they are passed on to each host."""
+    """Return the options of the command itself, for the command line on each host."""
     values = vars(arguments)
     options = [
         f"--{name}" for name in ("leftovers", "follow", "times", "previous") if values.get(name)

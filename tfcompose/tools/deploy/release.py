@@ -1,4 +1,4 @@
-"""A release: a robot's built files and the files they name, in a folder on each host."""
+"""Release of a robot: its built files and the files that they name."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
     from tfcompose.model.robot import Asset, Robot
 
-#: The folder of the files that were not built, but are named; that of wheels.
+#: The folders in a release for files that the robot names, and for wheels.
 NAMED, WHEELS = "files", "wheels"
-#: No more is taken from a folder that a process names, files and bytes.
+#: The maximum numbers of files and bytes in a folder that a process names.
 MOST_FILES, MOST_BYTES = 20_000, 2_000_000_000
-#: A name of the content needs no more characters than this.
+#: The length of a release's name, in characters of its digest.
 NAME_LENGTH = 16
-#: Files of these kinds name others by paths that begin in their own folder, if they are no larger.
+#: Suffixes of files that may name other files relative to their own folder, and the maximum size
+#: of such a file in bytes.
 _NAMING = frozenset(
     {".dae", ".gltf", ".json", ".mtl", ".obj", ".sdf", ".urdf", ".xacro", ".xml", ".yaml", ".yml"}
 )
@@ -42,22 +43,22 @@ _WORD = re.compile(rb"[A-Za-z0-9_./ -]+\.[A-Za-z0-9]+")
 
 @dataclass(frozen=True, slots=True)
 class _Packing(Target):
-    """Address files by their places in the release."""
+    """Replaces paths of files by their paths in the release."""
 
-    #: The path in the release of each file, by its absolute path here. Empty for a file that has
-    #: no place yet.
+    #: The path of each file in the release, by its absolute path on this computer. Empty if the
+    #: path is not yet known.
     places: dict[str, str] = field(default_factory=dict)
 
     def address(self, asset: Asset) -> str:
         """Return the address of a mesh or an image.
 
-        Packages are installed on the hosts by other means.
+        An address in a package stays, because the hosts must have the package installed.
         """
         is_file = bool(asset.path) and ("://" not in asset.uri or asset.uri.startswith("file://"))
         return self.from_folder(asset.path) if is_file else asset.uri
 
     def from_folder(self, path: str) -> str:
-        """Return the file's path in the release, relative to the description that names it."""
+        """Return a file's path relative to the URDF that names it."""
         file = posixpath.normpath(posixpath.join(self.top, path))
         return posixpath.relpath(self.places.setdefault(file, NAMED), self.folder)
 
@@ -66,14 +67,14 @@ class _Packing(Target):
 class Release:
     """The files of a release, by their paths in its folder.
 
-    Its name is derived from their content: the same content has the same name wherever it is
-    built.
+    The name of a release is a digest of its files. The same files have the same name on every
+    computer.
     """
 
     plan: Plan
     #: Built files.
     texts: Mapping[str, str]
-    #: Copied files, with their paths on this computer.
+    #: Paths on this computer of the files to copy, by their paths in the release.
     copies: Mapping[str, Path]
 
     @cached_property
@@ -84,7 +85,7 @@ class Release:
 
     @property
     def name(self) -> str:
-        """The release's name."""
+        """The name of the release."""
         return name_of(self.manifest)
 
     @property
@@ -93,7 +94,7 @@ class Release:
         return any(path.startswith(f"{WHEELS}/") for path in self.copies)
 
     def with_text(self, path: str, text: str) -> Release:
-        """Return the release with one more file; the others' digests are kept."""
+        """Return the release with another file, without computing the other digests again."""
         made = Release(self.plan, {**self.texts, path: text}, self.copies)
         made.__dict__["manifest"] = self.manifest | {path: digest_of(text.encode())}
         return made
@@ -113,7 +114,7 @@ class Release:
 
 
 def name_of(manifest: Mapping[str, str]) -> str:
-    """Return the name of the release with these files, by their digests."""
+    """Return the name of a release from the digests of its files."""
     return digest_of(repr(sorted(manifest.items())).encode())[:NAME_LENGTH]
 
 
@@ -129,9 +130,10 @@ def _add(
 
 
 def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
-    """Return the release of a valid robot, whose relative paths begin in this folder.
+    """Return the release of a valid robot.
 
-    Files keep their relative places, so that a map finds its image and a mesh its textures.
+    Relative paths start at the current folder. Files keep their positions relative to each other,
+    so that a map finds its image and a mesh finds its textures.
 
     Raises:
         RejectedError: with each named file that cannot be copied.
@@ -150,7 +152,7 @@ def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
     texts = {file.path: file.text for file in emit(robot, target)}
     plan = replace(
         plan_of(robot.with_final_names(), target), hosts={}
-    )  # where hosts are may change, and nothing else
+    )  # only addresses of hosts may differ
     texts["plan.json"] = write_plan(plan)
     copies = {places[file]: Path(file) for file in files}
     for wheel in sorted(wheels.glob("*.whl")) if wheels else ():
@@ -159,17 +161,17 @@ def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
 
 
 def _add_named_files(named: Mapping[str, str]) -> list[str]:
-    """Return the files, those in named folders, and those that they name.
+    """Return the named files, all files in named folders, and the files that these name.
 
     Raises:
-        RejectedError: if one is not there, or they are too many.
+        RejectedError: if a file does not exist, or there are too many files.
     """
-    found: dict[str, None] = {}
+    paths: dict[str, None] = {}
     size = 0
     waiting = sorted(named)
     while waiting:
         path = Path(waiting.pop())
-        if path.as_posix() in found:
+        if path.as_posix() in paths:
             continue
         if is_folder(path):
             inside = (inner for inner in sorted(path.rglob("*")) if is_file(inner))
@@ -177,14 +179,14 @@ def _add_named_files(named: Mapping[str, str]) -> list[str]:
                 inner.as_posix() for inner in inside if not _is_hidden(inner.relative_to(path))
             ]
         elif is_file(path):
-            found[path.as_posix()] = None
+            paths[path.as_posix()] = None
             size += path.stat().st_size
             waiting += _files_named_in(path)
         else:
             raise RejectedError(
                 [finding("TF912", f"{path} does not exist, and the robot needs it", None)]
             )
-        if len(found) + len(waiting) > MOST_FILES or size > MOST_BYTES:
+        if len(paths) + len(waiting) > MOST_FILES or size > MOST_BYTES:
             most = f"{MOST_FILES:,} files or {MOST_BYTES // 10**9} GB"
             advice = "name a folder with only what the robot needs"
             raise RejectedError(
@@ -194,7 +196,7 @@ def _add_named_files(named: Mapping[str, str]) -> list[str]:
                     )
                 ]
             )
-    return sorted(found)
+    return sorted(paths)
 
 
 def _is_hidden(path: Path) -> bool:
@@ -202,7 +204,7 @@ def _is_hidden(path: Path) -> bool:
 
 
 def _files_named_in(path: Path) -> list[str]:
-    """Return the files that a file names by paths that begin in its own folder."""
+    """Return the files that a file names relative to its own folder."""
     if path.suffix.lower() not in _NAMING or path.stat().st_size > _MOST_NAMING_BYTES:
         return []
     names = {name.decode().strip() for name in _WORD.findall(path.read_bytes())}
@@ -211,9 +213,9 @@ def _files_named_in(path: Path) -> list[str]:
 
 
 def _places(files: list[str], named: Mapping[str, str]) -> dict[str, str]:
-    """Return where files and named folders are in the release.
+    """Return the paths of files and named folders in the release.
 
-    As they are below the folder that has all of them.
+    These paths are relative to the folder that contains all of them.
     """
     everything = [*files, *named]
     folders = [posixpath.dirname(file) for file in files] + [

@@ -1,8 +1,9 @@
-"""The steps that bring a release to all hosts, or to none.
+"""Steps of a deployment, which changes all hosts or none.
 
-Ask every host for its state; take every lock; send the release and rehearse it. Then stop all
-hosts, start the release on trial, and wait until every edge of every host is live. Launchers that
-can follow the release keep running. Finally keep it everywhere, or go back everywhere.
+A deployment asks every host for its state, locks every host, and sends the release. Each host
+checks if it can start the release. Then the deployment stops all hosts, starts the release on
+trial, and waits until every edge of every host is live. A launcher that can switch to the release
+keeps running. Finally all hosts keep the release, or all hosts return to their previous release.
 """
 
 from __future__ import annotations
@@ -40,13 +41,13 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan, PlanHost
     from tfcompose.tools.deploy.release import Release
 
-#: A part of a release that is sent at once, in bytes.
+#: The size in bytes of the chunks in which a release is sent.
 CHUNK = 1_000_000
-#: The plan among a release's files.
+#: The path of the plan in a release.
 PLAN = "plan.json"
-#: How long a host waits before it says how far it is, in seconds.
+#: The interval at which a host reports its progress, in seconds.
 SLICE_S = 3.0
-#: So many names are listed.
+#: The maximum number of names in a message.
 NAMED_AT_MOST = 8
 
 
@@ -55,15 +56,15 @@ class DeployTarget:
     """The hosts and options of a deployment."""
 
     plan: Plan
-    #: By name.
+    #: The hosts by name.
     hosts: Mapping[str, PlanHost]
-    #: The hosts' places in the robot file.
+    #: The locations of the hosts in the robot file.
     places: Mapping[str, Span]
     #: Whether units belong to the system's systemd instead of the user's.
     system: bool = False
     #: Whether these are all the hosts that run processes.
     is_complete: bool = True
-    #: The largest accepted difference between clocks.
+    #: The largest accepted difference between clocks, in seconds.
     clock_limit_s: float = 0.1
     timeout_s: float = 60.0
     #: Whether to wait until every edge is live.
@@ -72,7 +73,7 @@ class DeployTarget:
 
 @dataclass(slots=True)
 class Share:
-    """A host during a deployment: its current and its future release."""
+    """The state of a host during a deployment, with its current and its new release."""
 
     host: ConnectedHost
     unit: Unit
@@ -83,7 +84,7 @@ class Share:
     release: Release | None = None
     #: The name of the release to run.
     goal: str = ""
-    #: Whether its launcher can change to the release while it runs.
+    #: Whether its launcher can switch to the release while it runs.
     follows: bool = False
 
     @property
@@ -92,8 +93,8 @@ class Share:
         return self.host.name
 
     @property
-    def wanted(self) -> Release:
-        """The release that the host's current one is compared with."""
+    def new_release(self) -> Release:
+        """The release with which the host's current release is compared."""
         assert self.release is not None, "it is made before anything is compared"  # noqa: S101
         return self.release
 
@@ -105,21 +106,25 @@ class Share:
         return f"Python {probe['python']}, {version}{logout}"
 
     def changes(self) -> list[str]:
-        """Return the changes on the host, one line each.
+        """Return a line for each change on the host.
 
-        Empty if it runs the release unchanged.
+        The list is empty if the host already runs the release.
         """
         if self.release is None:
             return [f"release {self.state['release']} → {self.goal}"]
-        there, wanted = self.state["files"], self.wanted.manifest
+        installed, manifest = self.state["files"], self.new_release.manifest
         changed = [
-            ("new", wanted.keys() - there.keys()),
-            ("removed", there.keys() - wanted.keys()),
+            ("new", manifest.keys() - installed.keys()),
+            ("removed", installed.keys() - manifest.keys()),
         ]
         changed.append(
             (
                 "changed",
-                {path for path in wanted.keys() & there.keys() if wanted[path] != there[path]},
+                {
+                    path
+                    for path in manifest.keys() & installed.keys()
+                    if manifest[path] != installed[path]
+                },
             )
         )
         lines = [f"{path}: {change}" for change, paths in changed for path in sorted(paths)]
@@ -133,7 +138,7 @@ class Share:
 
 
 class Rollout:
-    """A deployment to connected hosts. ``report`` takes progress messages."""
+    """A deployment to connected hosts. ``report`` is called with progress messages."""
 
     def __init__(
         self, target: DeployTarget, shares: list[Share], report: Callable[[str], None]
@@ -142,7 +147,7 @@ class Rollout:
         self.shares = shares
         self.report = report
 
-    # Before anything changes.
+    # Steps that change nothing
 
     async def examine(self) -> list[Finding]:
         """Return findings about the hosts, and about differences between them."""
@@ -179,24 +184,27 @@ class Rollout:
         await self._decide_who_follows(release.plan)
 
     async def _decide_who_follows(self, plan: Plan) -> None:
-        """Find out which hosts can go on while they change, which all of them have to allow."""
+        """Set ``follows`` for hosts whose launchers can keep running.
+
+        This is possible only if the plans of all changing hosts allow it.
+        """
         changing = [share for share in self.shares if share.changes() and share.state["release"]]
         texts = await asyncio.gather(
             *(share.host.ask("texts", paths=[PLAN], any_size=True) for share in changing)
         )
         try:
             before = [read_plan(some[PLAN], PLAN) for some in texts if some.get(PLAN)]
-        except RejectedError:  # another version's
+        except RejectedError:  # a plan of another version
             return
         if len(before) < len(changing) or not all(can_follow(share, plan) for share in before):
             return
         for share in changing:
             share.follows = self._is_sound(share) and same_files(
-                share.state["files"], share.wanted.manifest
+                share.state["files"], share.new_release.manifest
             )
 
     def _is_sound(self, share: Share) -> bool:
-        """Whether a host runs its release as it was brought there, with all that it starts."""
+        """Return whether a host runs its deployed release, with all its processes."""
         state, robot = share.state, share.state["robot"]
         if (
             robot is None
@@ -228,15 +236,15 @@ class Rollout:
         ]
 
     def changes(self) -> dict[str, list[str]]:
-        """Return the changes by host, one line each.
+        """Return a line for each change, by host.
 
-        A host that already runs its goal is missing.
+        A host that already runs its goal has no entry.
         """
-        found = {share.name: share.changes() for share in self.shares}
-        return {name: lines for name, lines in found.items() if lines}
+        changes = {share.name: share.changes() for share in self.shares}
+        return {name: lines for name, lines in changes.items() if lines}
 
     def describe(self) -> str:
-        """Return which releases run on which hosts, in words."""
+        """Return a text with the release of each host."""
         return list_names(
             [f"{share.name} runs release {share.state['release']}" for share in self.shares],
             NAMED_AT_MOST,
@@ -246,15 +254,17 @@ class Rollout:
         """Return the lines of a unified diff of all texts that would change."""
         lines: list[str] = []
         for share in self.shares:
-            there, wanted = share.state["files"], share.wanted.manifest
+            installed, manifest = share.state["files"], share.new_release.manifest
             paths = sorted(
                 path
-                for path in there.keys() | wanted.keys()
-                if there.get(path) != wanted.get(path)
+                for path in installed.keys() | manifest.keys()
+                if installed.get(path) != manifest.get(path)
             )
-            texts = await share.host.ask("texts", paths=[path for path in paths if path in there])
+            texts = await share.host.ask(
+                "texts", paths=[path for path in paths if path in installed]
+            )
             for path in paths:
-                before, after = texts.get(path), share.wanted.texts.get(path)
+                before, after = texts.get(path), share.new_release.texts.get(path)
                 if before is None and after is None:
                     lines.append(f"{share.name}/{path}: differs (not text)")
                     continue
@@ -264,13 +274,13 @@ class Rollout:
                 )
         return lines
 
-    # The change.
+    # Steps of the change
 
     async def lock(self) -> None:
         """Take the locks of all hosts, in the same order in every deployment.
 
         Raises:
-            RejectedError: with who holds one.
+            RejectedError: with the holder of a lock that is taken.
         """
         who = f"{getpass.getuser()}@{os.uname().nodename}, pid {os.getpid()}"
         for share in sorted(self.shares, key=lambda share: share.name):
@@ -282,20 +292,22 @@ class Rollout:
                 )
 
     async def send(self) -> None:
-        """Send the release to the hosts that lack it, and rehearse it there.
+        """Send the release to hosts that do not have it, and check that they can start it.
 
         Raises:
-            RejectedError: with what keeps it from being started; nothing runs otherwise than
-                before.
+            RejectedError: with findings that prevent a start. The hosts still run what they ran
+            before.
         """
         await self._all(self._send)
-        found = [finding for some in await self._all(self._rehearse) for finding in some]
-        if found:
-            await self._all(lambda share: self._ask(share, "discard", release=share.wanted.name))
-            raise RejectedError(found)
+        findings = [finding for some in await self._all(self._rehearse) for finding in some]
+        if findings:
+            await self._all(
+                lambda share: self._ask(share, "discard", release=share.new_release.name)
+            )
+            raise RejectedError(findings)
 
     async def _send(self, share: Share) -> None:
-        release = share.wanted
+        release = share.new_release
         if share.state["release"] == release.name and share.state["files"] == release.manifest:
             return
         size = 0
@@ -315,7 +327,9 @@ class Rollout:
         )
 
     async def _rehearse(self, share: Share) -> list[Finding]:
-        found = await self._ask(share, "rehearse", release=share.wanted.name, host=share.name)
+        answers = await self._ask(
+            share, "rehearse", release=share.new_release.name, host=share.name
+        )
         span = share.host.span
         return [
             finding(
@@ -324,18 +338,18 @@ class Rollout:
                 span,
                 help=finding_there["help"],
             )
-            for finding_there in found
+            for finding_there in answers
         ]
 
     async def activate(self) -> str:
         """Start each host's goal on trial, and keep it once every edge is live.
 
-        Return the summary. A host that already runs its goal keeps running; one that can follow
-        restarts only the processes that differ.
+        Return a summary. A host that already runs its goal keeps running. A host whose launcher
+        can switch restarts only the processes that differ.
 
         Raises:
-            RejectedError: with what is missing, or which host was lost, and what the others went
-                back to.
+            RejectedError: with missing edges or a lost host, and the releases to which the other
+            hosts returned.
         """
         begun = time.monotonic()
         changing = [share for share in self.shares if share.changes()]
@@ -347,9 +361,9 @@ class Rollout:
             live = await self._until_live(begun) if self.target.waits else "started"
             await self._all(lambda share: self._ask(share, "commit", release=share.goal), changing)
         except RejectedError as error:
-            first, *others = error.findings
+            first, *further = error.findings
             notes = (*first.notes, *await self._back(changing))
-            raise RejectedError([replace(first, notes=notes), *others]) from None
+            raise RejectedError([replace(first, notes=notes), *further]) from None
         except BaseException:
             await self._back(changing)
             raise
@@ -387,14 +401,14 @@ class Rollout:
         return lambda share: self._ask(share, "wait", seconds=seconds)
 
     def not_live(self) -> list[Finding]:
-        """Return findings about edges and processes that were not live at the comparison."""
+        """Return findings about edges and processes that ``compare`` did not find live."""
         return [problem for share in self.shares for problem in self._missing(share, share.state)]
 
     async def plan_return(self) -> None:
         """Make the previous release each host's goal.
 
         Raises:
-            RejectedError: if a host has none.
+            RejectedError: if a host has no previous release.
         """
         states = await self._by_name(lambda share: share.host.ask("state"))
         findings = []
@@ -409,13 +423,17 @@ class Rollout:
 
     def _edges(self) -> list[str]:
         plan, names = self.target.plan, {share.name for share in self.shares}
-        own = {process.name for process in plan.processes if process.host in names}
-        return [edge.name for edge in plan.edges if self.target.is_complete or edge.owner in own]
+        names_of_processes = {process.name for process in plan.processes if process.host in names}
+        return [
+            edge.name
+            for edge in plan.edges
+            if self.target.is_complete or edge.owner in names_of_processes
+        ]
 
     def _missing(self, share: Share, state: dict[str, Any]) -> list[Finding]:
-        """Return findings about processes and edges of a host, from its launcher.
+        """Return findings about missing processes and edges, from a host's launcher.
 
-        If the target is only some of the hosts, only theirs.
+        If the deployment is only for some hosts, return only findings about these hosts.
         """
         plan, robot, span = self.target.plan, state["robot"], share.host.span
         notes = [Note(line) for line in state["lines"]]
@@ -455,7 +473,10 @@ class Rollout:
         return findings
 
     async def _back(self, shares: Sequence[Share]) -> list[Note]:
-        """Let these hosts go back, whatever becomes of the others, and return what each says."""
+        """Return these hosts to their previous releases, and return a note for each host.
+
+        If a host fails, the others still return.
+        """
         answers = await asyncio.gather(
             *(share.host.ask("back") for share in shares), return_exceptions=True
         )
@@ -477,13 +498,13 @@ class Rollout:
                 notes.append(Note(f"{share.name} had no previous release and runs nothing"))
         return notes
 
-    # How hosts are asked.
+    # Requests to hosts
 
     async def _ask(self, share: Share, request: str, **arguments: Any) -> Any:
-        """Return the answer.
+        """Send a request to a host and return the answer.
 
         Raises:
-            RejectedError: if the host is lost, or cannot do it.
+            RejectedError: if the host is lost, or cannot carry out the request.
         """
         try:
             return await share.host.ask(request, **arguments)
@@ -499,10 +520,10 @@ class Rollout:
     async def _all(
         self, do: Callable[[Share], Awaitable[Any]], shares: Sequence[Share] | None = None
     ) -> list[Any]:
-        """Do it on all hosts, or these, at once, and return the answers.
+        """Call a function for all hosts, or for these, concurrently; return the results.
 
         Raises:
-            RejectedError: with what went wrong on any host, once all are done with it.
+            RejectedError: with the findings of all hosts, after all calls have ended.
         """
         answers = await asyncio.gather(
             *(map(do, self.shares if shares is None else shares)), return_exceptions=True
@@ -541,12 +562,12 @@ async def _probe(host: ConnectedHost) -> dict[str, Any]:
 def target_of(
     plan: Plan, names: Sequence[str], places: Mapping[str, Span], **options: Any
 ) -> DeployTarget:
-    """Return the target of a deployment: all hosts with processes, or the named ones.
+    """Return the target of a deployment: all hosts with processes, or the named hosts.
 
-    ``options`` are those of ``DeployTarget``.
+    ``options`` are further fields of ``DeployTarget``.
 
     Raises:
-        RejectedError: with what the robot file lacks.
+        RejectedError: with findings about missing parts of the robot file.
     """
     used = [name for name in plan.hosts if name in hosts_of(plan)]
     if not plan.hosts:
@@ -564,9 +585,9 @@ def target_of(
     findings = []
     for name in names:
         if name not in used:
-            known = f"hosts with processes: {', '.join(used)}"
+            listed = f"hosts with processes: {', '.join(used)}"
             message = f"no process of {plan.robot} runs on a host named {name}"
-            findings.append(finding("TF819", message, None, help=did_you_mean(name, used, known)))
+            findings.append(finding("TF819", message, None, help=did_you_mean(name, used, listed)))
     shares = [share_of(plan, name, "") for name in used]
     findings += [share for share in shares if isinstance(share, Finding)]
     if findings:
@@ -576,7 +597,7 @@ def target_of(
 
 
 def _clocks_apart(offsets: Mapping[str, float], target: DeployTarget) -> Iterable[Finding]:
-    """Yield a finding if clocks of hosts differ by more than may be."""
+    """Yield a finding if clocks of hosts differ by more than the limit."""
     if len(offsets) < 2:  # noqa: PLR2004 (a difference needs two)
         return
     first, last = (
@@ -593,10 +614,10 @@ def _clocks_apart(offsets: Mapping[str, float], target: DeployTarget) -> Iterabl
         yield finding("TF834", message, target.places.get(last), help=advice)
 
 
-#: What nodes of one robot must agree about, by the variable that decides it, and what it is
-#: without.
+#: Environment variables that must be equal on all hosts, and the values that apply if they are not
+#: set.
 _AGREED = {"ROS_DOMAIN_ID": "0", "RMW_IMPLEMENTATION": "the default", "ROS_LOCALHOST_ONLY": "0"}
-#: The key that decides it for all hosts.
+#: Advice with the key of the robot file that sets a variable on all hosts.
 _HOLDS = {
     "ROS_DOMAIN_ID": "set it for all hosts: ros: {domain_id: N}",
     "RMW_IMPLEMENTATION": "set it for all hosts: ros: {rmw: fastdds}, or another",
@@ -604,9 +625,9 @@ _HOLDS = {
 
 
 def _settings_apart(shares: Sequence[Share], target: DeployTarget) -> Iterable[Finding]:
-    """Yield what keeps the hosts' nodes from finding each other.
+    """Yield a finding if nodes on the hosts cannot discover each other.
 
-    Another domain, middleware, or no discovery.
+    Possible reasons are different domains or middlewares, or limited discovery.
     """
     ros = target.plan.ros
     settings = {"ROS_DOMAIN_ID": ros.domain_id, "RMW_IMPLEMENTATION": ros.rmw}
@@ -623,7 +644,7 @@ def _settings_apart(shares: Sequence[Share], target: DeployTarget) -> Iterable[F
                 help=_HOLDS.get(variable, "set it alike in setup"),
             )
     if ros.rmw == "zenoh" or len({share.probe["machine"] for share in shares}) == 1:
-        return  # a router connects them; or all are one computer
+        return  # a router connects the hosts, or all hosts are the same computer
     range_of = "ROS_AUTOMATIC_DISCOVERY_RANGE"
     reaches = {
         share.name: (ros.discovery or share.probe["env"].get(range_of, "subnet")).lower()
@@ -647,7 +668,7 @@ async def reach_hosts(
     """Connect to all hosts of the target at once.
 
     Raises:
-        RejectedError: with the hosts that cannot be reached, or run no agent.
+        RejectedError: with a finding for each host that cannot be reached or cannot run the agent.
     """
     plan = target.plan
     connecting = []
@@ -660,20 +681,20 @@ async def reach_hosts(
         if findings := [result for result in done if isinstance(result, Finding)]:
             raise RejectedError(findings)
         rollout = Rollout(target, [], report)
-        for there, probe in zip(
+        for connected_host, probe in zip(
             hosts, await asyncio.gather(*(_probe(host) for host in hosts)), strict=True
         ):
             unit = Unit(
-                f"{plan.robot}.{there.name}",
+                f"{plan.robot}.{connected_host.name}",
                 plan.robot,
-                there.name,
+                connected_host.name,
                 base=probe["base"],
                 python=probe["executable"],
                 setup=tuple(probe["setup"]),
                 system=target.system,
                 has_wheels=has_wheels,
             )
-            rollout.shares.append(Share(there, unit, probe))
+            rollout.shares.append(Share(connected_host, unit, probe))
         yield rollout
     finally:
         await asyncio.gather(*(host.close() for host in hosts), return_exceptions=True)

@@ -1,4 +1,4 @@
-"""Deploy tool: a robot on several computers, by ssh."""
+"""The tool ``deploy``: it installs a robot on several computers over ssh."""
 
 from tfcompose.foundation.tool import Command, Option, Tool, Topic
 

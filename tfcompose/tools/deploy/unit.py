@@ -1,4 +1,4 @@
-"""The systemd unit of a robot on a host."""
+"""Text of the systemd unit of a robot on a host."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from dataclasses import dataclass
 from tfcompose.launcher.program import anywhere
 from tfcompose.model.systemd import quote, source_then_run
 
-#: How long everything on a host has to end: the launcher ends processes one after the other.
+#: The time in seconds in which all processes on a host must end. The launcher ends them one after
+#: another.
 STOP_S = 90
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """The systemd unit of a robot's share on a host. All paths are absolute, on the host."""
+    """The systemd unit for the part of a robot on a host.
 
-    #: ROBOT.HOST.
+    All paths are absolute paths on the host.
+    """
+
+    #: The name of the robot's part on the host: ROBOT.HOST.
     name: str
     robot: str
     host: str
@@ -32,11 +36,11 @@ class Unit:
 
     @property
     def file(self) -> str:
-        """The unit's file name."""
+        """The file name of the unit."""
         return f"tfcompose-{self.name}.service"
 
     def text(self) -> str:
-        """Return the unit, which starts the current release."""
+        """Return the text of the unit, which starts the current release."""
         run = f"tfcompose/{self.name}"
         parts = {
             "Unit": [
@@ -65,12 +69,12 @@ class Unit:
         return "\n".join("\n".join([f"[{name}]", *lines, ""]) for name, lines in parts.items())
 
     def _command(self) -> str:
-        at = f"{self.base}/current"
-        python = f"{at}/venv/bin/python" if self.has_wheels else self.python
+        current = f"{self.base}/current"
+        python = f"{current}/venv/bin/python" if self.has_wheels else self.python
         argv = [
             *anywhere(python),
             "up",
-            f"{at}/plan.json",
+            f"{current}/plan.json",
             "--host",
             self.host,
             "--no-live",

@@ -1,1 +1,1 @@
-"""Docs tool: the topics, commands, codes and keys as a site of static pages."""
+"""Site of static pages with all topics, commands, codes and keys."""

@@ -1,4 +1,4 @@
-"""Addresses of topics, commands, codes and keys within the site, and of what a text names."""
+"""Addresses of topics, commands, codes and keys in the site, for links in texts."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 #: The topic whose page lists all codes.
 CODES = "codes"
-#: ``tfcompose help sensors.place``; ``tfcompose lint robots --untrusted``, or without its first
-#: word; ``restart: on-failure``; ``guard: {unknown_edges: …}``.
+#: Texts that become links: ``tfcompose help sensors.place``; ``tfcompose lint robots
+#: --untrusted``, also without ``tfcompose``; ``restart: on-failure``; ``guard: {unknown_edges:
+#: …}``.
 _HELP = re.compile(r"tfcompose help ([\w.]+)")
 _COMMAND = re.compile(r"(?:tfcompose )?([a-z]+)(?: (.*))?", re.DOTALL)
 _OPTION = re.compile(r"(?<!\S)--[a-z-]+")
@@ -25,7 +26,7 @@ _KEY = re.compile(r"\w+(?:\.\w+)*")
 
 
 def key_set_by(text: str) -> str:
-    """Return the key to which a text gives a value, as in ``stop: {…}``; empty if none."""
+    """Return the key that a text sets, as in ``stop: {…}``; empty if it sets none."""
     match = _SETTING.fullmatch(text)
     return match[1] if match else ""
 
@@ -46,12 +47,12 @@ def keys_path(language: str) -> str:
 
 
 def key_anchor(section: str, key: str) -> str:
-    """Return the anchor of a section's key, on the page of its language."""
+    """Return the anchor of a section's key on the page of its language."""
     return f"{section.lower()}.{key}"
 
 
 def relative(address: str, page: str) -> str:
-    """Return an address of the site as seen from one of its pages."""
+    """Return an address of the site relative to a page."""
     path, hash_, anchor = address.partition("#")
     if path == page:
         return f"#{anchor}"
@@ -59,7 +60,10 @@ def relative(address: str, page: str) -> str:
 
 
 class Addresses:
-    """Finds what a text names. An address is a path, and an anchor behind ``#``."""
+    """Finds the page that a text names.
+
+    An address is a path in the site, and may end with ``#`` and an anchor.
+    """
 
     def __init__(
         self,
@@ -67,7 +71,7 @@ class Addresses:
         commands: Mapping[str, Collection[str]],
         codes: Collection[str],
     ) -> None:
-        """Take the names that have pages; commands with their options."""
+        """Set the names that have pages: topics, commands with their options, and codes."""
         self._topics = topics
         self._commands = commands
         self._codes = codes
@@ -81,10 +85,11 @@ class Addresses:
         return topic_path(name) if name in self._topics else ""
 
     def of_code_span(self, text: str, keys: Collection[str] | None = None) -> str:
-        """Return the address of what stands between backticks; empty if that is nothing known.
+        """Return the address for a text between backticks; empty if it names no page.
 
-        In a text about the robot file a word alone may be a key. One that is a command too is a
-        key if it is among ``keys``: those to which the text gives a value, as in ``stop: {…}``.
+        In a page about the robot file, a single word can be a key. ``keys`` are the keys that the
+        page sets, as in ``stop: {…}``. If a word is both a command and a key, it counts as a key
+        only if it is one of ``keys``.
         """
         if match := _HELP.fullmatch(text):
             return self._of_help(match[1])
@@ -122,7 +127,10 @@ class Addresses:
 
 @cache
 def _key_address(path: str) -> str:
-    """Return the address of a robot file's key; in many sections, that of the list of them."""
+    """Return the address of a key of the robot file.
+
+    If many sections have the key, return the address of their list.
+    """
     name = path.rpartition(".")[2]
     sections = sections_with_key(path)
     if not sections:

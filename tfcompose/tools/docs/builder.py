@@ -1,4 +1,4 @@
-"""Builds the pages: each from what the core knows of a topic, a command, a code or a language."""
+"""Builder of the site's pages for topics, commands, codes and languages."""
 
 from __future__ import annotations
 
@@ -55,24 +55,24 @@ FAMILY_TITLES: dict[Family, str] = {
     "live": "Running robots: live tools",
     "environment": "Environment",
 }
-#: Families whose findings are about a robot file, where a comment can allow them.
+#: Families of findings about a robot file. A comment in the file can allow such a finding.
 _OF_FILES = frozenset({"tree", "ownership", "poses", "names", "sensors", "bodies"})
-#: The group of topics about the robot file: its words between backticks are keys.
+#: The group of topics about the robot file. In these topics, words between backticks can be keys.
 ROBOT_FILE = "Robot file"
-#: Columns of the usage of commands.
+#: The width of commands' usage texts, in columns.
 _USAGE_COLUMNS = 76
 
 
 class Builder:
-    """Builds pages, and keeps what is to be searched and which pages name a code."""
+    """Builds pages, and collects the rows of the search and the links between pages."""
 
     def __init__(self, renderer: Renderer, settings: Callable[..., str]) -> None:
-        """Take the template of how a code is silenced."""
+        """Set the renderer, and the template for the settings of a code."""
         self._renderer = renderer
         self._settings = settings
-        #: Kind, title, address and text of what is found by the search.
+        #: The rows of the search: kind, title, address and text.
         self.search_rows: list[tuple[str, str, str, str]] = []
-        #: By the path of a page, the pages that link to it.
+        #: The pages that link to a page, by the path of that page.
         self.mentions: dict[str, list[SitePage]] = {}
 
     def topic(self, name: str, about: str, group: str) -> SitePage:
@@ -97,7 +97,10 @@ class Builder:
     def command(
         self, name: str, command: CommandModule, group: str, topics: Mapping[str, SitePage]
     ) -> CommandPage:
-        """Return the page of a command, with its text unless that is one of the topics."""
+        """Return the page of a command.
+
+        If the command's text is not the page of a topic, the page contains this text.
+        """
         path, parser = command_path(name), parser_of(name, _USAGE_COLUMNS)
         of_topic = topics.get(topic_of_command(name, command))
         text = "" if of_topic else text_of_command(name, command)
@@ -143,7 +146,7 @@ class Builder:
         return CommandArgument(row.name, row.form, self._renderer.plain_line(row.help, path))
 
     def code(self, code: str, tool: str) -> CodePage:
-        """Return the page of a code; ``tool`` is the one that brings it, or empty."""
+        """Return the page of a code; ``tool`` is the tool of the code, empty for the core."""
         entry, path = CATALOGUE[code], code_page(code)
         rendered = self._renderer.render(CATALOGUE.page(code), path)
         limit = _limit(entry.limit)
@@ -174,7 +177,7 @@ class Builder:
     def keys(self, language: str) -> KeysPage:
         """Return the page with all keys of a language."""
         path, reference = keys_path(language), reference_of(language)
-        sections = [self._section(known, path) for known in reference.sections]
+        sections = [self._section(entry, path) for entry in reference.sections]
         all_keys: dict[str, list[tuple[str, str]]] = {}
         for section in sections:
             for key in section.keys:
@@ -195,11 +198,11 @@ class Builder:
             sections=sections,
             all_keys=dict(sorted(all_keys.items())),
         )
-        for known in reference.sections:
-            self._add_row("keys", known.title, f"{path}#{known.title.lower()}", known.text)
-            for row in known.keys:
-                address = f"{path}#{key_anchor(known.title, row.name)}"
-                self._add_row("key", f"{known.title}.{row.name}", address, row.about)
+        for entry in reference.sections:
+            self._add_row("keys", entry.title, f"{path}#{entry.title.lower()}", entry.text)
+            for row in entry.keys:
+                address = f"{path}#{key_anchor(entry.title, row.name)}"
+                self._add_row("key", f"{entry.title}.{row.name}", address, row.about)
         return page
 
     def _section(self, section: ReferenceSection, path: str) -> KeySection:
@@ -240,7 +243,7 @@ class Builder:
 
 
 def _limit(limit: tuple[float, str] | None) -> str:
-    """Return a limit as a robot file has it; empty if there is none."""
+    """Return a limit in the form of a robot file; empty if there is none."""
     if limit is None:
         return ""
     value, unit = limit

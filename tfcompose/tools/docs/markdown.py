@@ -1,4 +1,4 @@
-"""Markdown as HTML: anchors, highlighted blocks, links to what a text names, text to search."""
+"""Conversion of Markdown to HTML with anchors, highlighted blocks and links."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.tools.docs.addresses import Addresses
 
-#: A code in a text, and the name of a topic behind "help".
+#: A code in a text, or the name of a topic after "help".
 _NAMED = re.compile(r"\b([A-Z]{2,8}\d{3})\b|(?<=\bhelp )([a-z]+)\b")
 _NOT_IN_ANCHORS = re.compile(r"[^\w.-]+")
 
@@ -37,20 +37,21 @@ class Heading:
 
 @dataclass(slots=True)
 class Rendered:
-    """A text as HTML, and what is known of it."""
+    """A page's text as HTML, with its title, headings, links and plain text."""
 
-    #: The heading of the first level, which is not in ``html``.
+    #: The heading of the first level. ``html`` does not contain it.
     title: str = ""
     html: Markup = field(default_factory=Markup)
     headings: list[Heading] = field(default_factory=list)
-    #: The text of each part by the anchor of its heading; that before the first one by "".
+    #: The plain text of each part, by the anchor of its heading. The text before the first heading
+    #: has the anchor "".
     parts: dict[str, str] = field(default_factory=dict)
-    #: The pages that it links to.
+    #: The paths of the pages to which the text links.
     targets: set[str] = field(default_factory=set)
 
 
 class Renderer:
-    """Renders the Markdown of pages, which links to others by ``addresses``."""
+    """Renders the Markdown of pages. ``addresses`` gives the addresses of links."""
 
     def __init__(self, addresses: Addresses) -> None:
         self._addresses = addresses
@@ -62,13 +63,13 @@ class Renderer:
     def render(self, text: str, page: str, *, names_keys: bool = False) -> Rendered:
         """Return Markdown of a page as HTML.
 
-        With ``names_keys`` a word between backticks may be a key of the robot file.
+        With ``names_keys``, a word between backticks can be a key of the robot file.
         """
         self._page = page
         return self._rendered(self._markdown.parse(text), names_keys=names_keys)
 
     def line(self, text: str, page: str) -> Markup:
-        """Return one line of Markdown as HTML, without a paragraph around it."""
+        """Return a line of Markdown as HTML, without a paragraph around it."""
         self._page = page
         return self._rendered(self._markdown.parseInline(text)).html
 
@@ -93,7 +94,7 @@ class Renderer:
         return page.rendered
 
     def _highlight(self, text: str, language: str, _: str) -> str:
-        """Return a block as HTML, in which codes are links."""
+        """Return a highlighted block as HTML, in which codes of findings are links."""
         try:
             lexer = get_lexer_by_name(language or "text", stripnl=False)
         except ClassNotFound:
@@ -107,20 +108,21 @@ class Renderer:
 
 
 class _Page:
-    """Walks over the tokens of a page once."""
+    """Converts the tokens of a page."""
 
     def __init__(self, page: str, addresses: Addresses, *, names_keys: bool) -> None:
         self.rendered = Rendered()
         self._page = page
         self._addresses = addresses
-        #: Keys to which this page gives a value; None where words are no keys.
+        #: The keys that this page sets; None if words of this page are not keys.
         self._keys: set[str] | None = set() if names_keys else None
         self._part = ""
-        #: What this part of the page links to already: a name is a link where it first occurs.
+        #: The addresses to which this part of the page already links. Only the first occurrence of
+        #: a name becomes a link.
         self._linked: set[str] = set()
 
     def tokens(self, tokens: list[Token]) -> Iterator[Token]:
-        """Yield the tokens with anchors, links and tables that scroll, without the title."""
+        """Yield the tokens without the title, with anchors, links and scrolling tables."""
         before = Token("", "", 0)
         is_title = False
         if self._keys is not None:
@@ -154,7 +156,7 @@ class _Page:
 
     def _begin_part(self, heading: Token, text: str) -> None:
         anchor = _NOT_IN_ANCHORS.sub("-", text.lower()).strip("-")
-        taken = {known.anchor for known in self.rendered.headings}
+        taken = {heading.anchor for heading in self.rendered.headings}
         while anchor in taken:
             anchor += "-"
         heading.attrSet("id", anchor)
@@ -167,7 +169,7 @@ class _Page:
         parts[self._part] = f"{parts.get(self._part, '')} {' '.join(text.split())}".strip()
 
     def _children(self, tokens: list[Token]) -> Iterator[Token]:
-        """Yield the tokens of a line of text, with links around what they name."""
+        """Yield the tokens of a line of text, with links."""
         links = 0
         for token in tokens:
             links += token.nesting if token.type.startswith("link_") else 0
@@ -196,7 +198,10 @@ class _Page:
         yield _text(text[end:])
 
     def _around(self, token: Token, address: str) -> Iterator[Token]:
-        """Yield the token in a link to the address, if that is elsewhere and new here."""
+        """Yield the token inside a link to the address.
+
+        Yield it without a link if the address is on this page or already has a link in this part.
+        """
         path, _, anchor = address.partition("#")
         if not address or address in self._linked or (path == self._page and not anchor):
             yield token

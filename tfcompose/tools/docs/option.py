@@ -11,7 +11,8 @@ from tfcompose.foundation.reading import exists
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-#: Lists the files of a site, one a line: a later one replaces them, and no others.
+#: The file that lists the files of a site, one in each line. A later ``--html`` replaces only
+#: these files.
 MANIFEST = "manifest.txt"
 
 
@@ -25,7 +26,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(command: str, arguments: Namespace) -> int | None:
-    """Write the site; exit code 2 where it cannot be written. None without ``--html``."""
+    """Write the site; return exit code 2 if that fails, None without ``--html``."""
     del command
     if arguments.html is None:
         return None
@@ -64,7 +65,7 @@ def _files_of_earlier_site(folder: Path) -> list[str]:
     """Return the files that an earlier ``help --html`` wrote to the folder.
 
     Raises:
-        OSError: if its list cannot be read.
+        OSError: if the list of these files cannot be read.
     """
     manifest = folder / MANIFEST
     try:
@@ -77,7 +78,7 @@ def _files_of_earlier_site(folder: Path) -> list[str]:
 
 
 def _is_of_a_site(path: str) -> bool:
-    """Return whether a line of a manifest may be a file of a site: nothing outside of it."""
+    """Return whether a line of a manifest is a file inside the site's folder."""
     parts = path.split("/")
     return ".." not in parts and not path.startswith("/") and path.endswith(_SUFFIXES)
 

@@ -1,4 +1,4 @@
-"""Pages of the site: the values that their templates show."""
+"""Values that the templates of the site's pages show."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class SitePage:
-    """A page, which has a template."""
+    """Base class of the pages. Each kind of page has a template."""
 
     template: str
-    #: From the folder of the site.
+    #: The path of the page in the site's folder.
     path: str
-    #: A topic's, a command's, a code's or a language's.
+    #: The name of the topic, command, code or language.
     name: str
     title: str
-    #: One line.
+    #: A description in a single line.
     about: str
-    #: The title of the group that it is in.
+    #: The title of the page's group.
     group: str = ""
     body: Markup = field(default_factory=Markup)
     headings: Sequence[Heading] = ()
 
     @property
     def label(self) -> str:
-        """Its name in the list of pages."""
+        """The name of the page in the list of pages."""
         return self.title
 
 
@@ -57,34 +57,34 @@ class ArgumentGroup:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class CommandPage(SitePage):
-    """A command with its arguments, and its topic if that is a page of its own."""
+    """A command with its arguments, and its topic if this has a separate page."""
 
     usage: str
     description: Markup
-    #: The title of its text, ``body``; empty if it has none.
+    #: The title of ``body``, the text of the command; empty if it has no text.
     heading: str
     arguments: Sequence[ArgumentGroup]
     topic: SitePage | None = None
 
     @property
     def label(self) -> str:
-        """Its name in the list of pages."""
+        """The name of the page in the list of pages."""
         return self.name
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class CodePage(SitePage):
-    """A code, with the limit that can be set, and the tool that brings it."""
+    """A code, with its limit, if the robot file can set one, and its tool."""
 
     entry: Code
     limit: str = ""
     tool: str = ""
-    #: How to silence it; empty where that is impossible.
+    #: Text about how to silence the code; empty if that is impossible.
     settings: Markup = field(default_factory=Markup)
 
     @property
     def label(self) -> str:
-        """Its name in the list of pages."""
+        """The name of the page in the list of pages."""
         return f"{self.name} {self.entry.name}"
 
 
@@ -116,12 +116,12 @@ class KeysPage(SitePage):
     """All keys of a language."""
 
     sections: Sequence[KeySection]
-    #: The sections that have a key: title, anchor.
+    #: The sections that have a key, each with title and anchor, by key.
     all_keys: dict[str, list[tuple[str, str]]]
 
     @property
     def label(self) -> str:
-        """Its name in the list of pages."""
+        """The name of the page in the list of pages."""
         return self.name
 
 
@@ -133,5 +133,5 @@ class PageGroup:
     pages: Sequence[SitePage]
     #: The anchor of the title.
     name: str = ""
-    #: Folded in the list of pages, unless one of them is shown.
+    #: Whether the group is folded in the list of pages, unless the current page is in it.
     is_folded: bool = False

@@ -1,4 +1,4 @@
-"""Site of the documentation: a page for each topic, command, code and language, and a search."""
+"""Files of the documentation site: pages, styles and scripts, and the index of the search."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ ABOUT = (
 
 
 def build_site() -> list[File]:
-    """Return the files of the site, the same for the same version and tools."""
+    """Return the files of the site.
+
+    The same version and tools always give the same files.
+    """
     templates = Environment(
         loader=FileSystemLoader(HERE / "templates"),
         autoescape=select_autoescape(["html"]),
@@ -79,7 +82,7 @@ class _Site:
         ]
 
     def files(self) -> Iterator[File]:
-        """Yield the pages, what they need, and the index of the search."""
+        """Yield the pages, their styles and scripts, and the index of the search."""
         for file in sorted((HERE / "assets").iterdir()):
             yield File(file.name, file.read_text("utf-8"))
         yield File("search-index.js", self._search_index())
@@ -115,13 +118,16 @@ class _Site:
         return File(page.path, text)
 
     def _navigation(self, page: SitePage) -> list[PageGroup]:
-        """Return the pages that stand beside a page: of codes those of its family alone."""
+        """Return the list of pages next to a page.
+
+        It contains only the codes of the page's own family.
+        """
         commands = PageGroup("Commands", list(_pages_of(self._commands)), is_folded=True)
         families = [family for family in self._families if page in family.pages]
         return [*families, *self._topics, self._keys, commands]
 
     def _search_index(self) -> str:
-        """Return a script that defines the rows of the search, one a line."""
+        """Return a script that defines the rows of the search, one in each line."""
         rows = ",\n".join(
             json.dumps(row, ensure_ascii=False, separators=(",", ":"))
             for row in self._builder.search_rows
@@ -134,6 +140,6 @@ def _pages_of(groups: Sequence[PageGroup]) -> Iterator[SitePage]:
 
 
 def _tools_of_codes() -> dict[str, str]:
-    """Return the codes with the tools that bring them; empty for the core."""
+    """Return the tool of each code; empty for codes of the core."""
     of_tools = {code: tool.name for tool in installed_tools().tools for code in tool.code_names()}
     return {code: of_tools.get(code, "") for code in CATALOGUE}

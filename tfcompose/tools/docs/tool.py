@@ -1,4 +1,4 @@
-"""Docs tool: the documentation as a site of static pages."""
+"""The tool for documentation: it writes a site of static pages."""
 
 from tfcompose.foundation.tool import Option, Tool
 

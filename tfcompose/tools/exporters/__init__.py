@@ -1,6 +1,6 @@
-"""Exports of a plan for other launchers: systemd units, a compose file, a ROS 2 launch file.
+"""Export of a plan for other launchers: systemd, Docker Compose, Kubernetes and ROS 2 launch.
 
-Each module is one format. It returns the files, and a sentence for each property of the plan that
-they lose. Must not import ``model``, ``resolve``, ``launcher``: exports know the plan, not the
-robot.
+The exporting function of each format returns the files to write. It also returns a sentence for
+each property of the plan that the files do not keep. Exports read the plan and not the robot file.
+Only ``launch_arguments`` reads the robot file, to find its arguments.
 """

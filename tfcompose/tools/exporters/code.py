@@ -1,4 +1,4 @@
-"""Python source with short lines."""
+"""Python source code that is broken into short lines."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-#: The longest line, except for a longer single word.
+#: The maximum length of a line. A single token may be longer.
 _WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True)
 class CodeBlock:
-    """A bracketed expression: the text before its parts, the parts, and the text after them."""
+    """A bracketed expression, such as a call: opening text, parts, and closing text."""
 
     begin: str
     parts: tuple[CodeBlock | str, ...]
@@ -24,7 +24,7 @@ class CodeBlock:
         return f"{self.begin}{', '.join(map(str, self.parts))}{self.end}"
 
     def lines(self, indent: str = "", end: str = "") -> Iterator[str]:
-        """Yield one line if it is short enough, else one line per part."""
+        """Yield the expression on a single line if it fits, else a line for each part."""
         if len(indent) + len(str(self)) + len(end) <= _WIDTH:
             yield f"{indent}{self}{end}"
             return
@@ -44,12 +44,12 @@ def call(name: str, *parts: CodeBlock | str) -> CodeBlock:
 
 
 def items(parts: Iterable[CodeBlock | str], keyword: str = "") -> CodeBlock:
-    """Return a list, or a keyword argument that is one."""
+    """Return a list or, with ``keyword``, a keyword argument whose value is a list."""
     return CodeBlock(f"{keyword}=[" if keyword else "[", tuple(parts), "]")
 
 
 def keyword(name: str, value: CodeBlock | str) -> CodeBlock | str:
-    """Return a keyword argument."""
+    """Return the keyword argument ``name=value``."""
     return (
         f"{name}={value}"
         if isinstance(value, str)

@@ -1,9 +1,9 @@
 """Export the plan for systemd, docker compose, Kubernetes or ros2 launch.
 
-Export a built plan, or a robot file, for systemd (a unit per process and a target), docker
-compose (a service per process), Kubernetes (a ConfigMap and a workload per process, with a
-kustomization) or ros2 launch (a launch file with stock nodes for fixed edges and joints). List
-everything that the other launcher cannot do.
+Export a built plan or a robot file. For systemd, write a unit for each process and a target. For
+docker compose, write a service for each process. For Kubernetes, write a ConfigMap, a workload for
+each process and a kustomization. For ros2 launch, write a launch file with stock nodes for fixed
+edges and joints. List each feature of up that the other launcher lacks.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from __future__ import annotations
 import os
 import sys
 from argparse import ArgumentTypeError
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,12 +22,13 @@ from tfcompose.cli.terminal import UNREADABLE, fail, reject
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.foundation.findings import Span
     from tfcompose.model.files import File
     from tfcompose.model.plan import Plan
 
 KINDS = ("systemd", "compose", "k8s", "launch")
-#: What ROS's setup files set, and what people set for ROS: units start without a shell that has
-#: it.
+#: Variables that ROS's setup files or users set for ROS. systemd starts units without a shell, so
+#: the units must contain these variables.
 ROS_VARIABLES = (
     "AMENT_PREFIX_PATH",
     "CYCLONEDDS_URI",
@@ -47,7 +50,7 @@ ROS_VARIABLES = (
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
+    """Add the arguments of ``export``."""
     parser.add_argument("kind", type=_kind, choices=KINDS, help="the launcher to export to")
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
@@ -63,6 +66,12 @@ def arguments(parser: ArgumentParser) -> None:
         ),
     )
     parser.add_argument(
+        "--format",
+        dest="form",
+        choices=("python", "xml", "yaml"),
+        help="launch: the launch file's format; default: python",
+    )
+    parser.add_argument(
         "--host",
         metavar="NAME",
         help="export only the processes of this host; '': those without a host; default: all",
@@ -71,8 +80,8 @@ def arguments(parser: ArgumentParser) -> None:
         "--at",
         metavar="DIR",
         help=(
-            "the plan's folder on the robot; default: systemd: the same as here; k8s: none, "
-            "the plan is in a ConfigMap"
+            "the plan's folder on the robot; default: systemd: the same as here; compose, launch: "
+            "relative to the written file; k8s: none, the plan is in a ConfigMap"
         ),
     )
     parser.add_argument(
@@ -98,10 +107,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def _kind(text: str) -> str:
-    """Return the launcher.
+    """Return the name of the launcher.
 
     Raises:
-        ArgumentTypeError: if it is called otherwise here.
+        ArgumentTypeError: for ``kubernetes``, because its name is ``k8s``.
     """
     if text == "kubernetes":
         raise ArgumentTypeError("write k8s for kubernetes")
@@ -109,7 +118,7 @@ def _kind(text: str) -> str:
 
 
 def run(arguments: Namespace) -> int:
-    """Write the export; exit code as for ``build``."""
+    """Write the exported files, and return the same exit codes as ``build``."""
     from tfcompose.cli.plans import (
         PLAN,
         host_share,
@@ -125,6 +134,8 @@ def run(arguments: Namespace) -> int:
         fail(
             "name the image of the pods, with ROS 2 Jazzy and tfcompose: --image NAME", UNREADABLE
         )
+    if arguments.form and arguments.kind != "launch":
+        fail(f"--format is for export launch, not for export {arguments.kind}", UNREADABLE)
     if is_plan(arguments.file):
         refuse_variant(arguments)
         file = Path(arguments.file)
@@ -155,7 +166,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
         files, differences = _export(plan, file, folder, arguments)
         write_all(folder, files)
     except RejectedError as error:
-        reject(error.findings, UNREADABLE)
+        reject(error.findings)
     except OSError as error:
         fail(f"nothing was written to {folder}: {error.strerror}", UNREADABLE)
     print(f"wrote {folder}: {', '.join(file.path for file in files)}")
@@ -172,28 +183,33 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
 def _export(
     plan: Plan, file: Path, folder: Path, arguments: Namespace
 ) -> tuple[tuple[File, ...], list[str]]:
-    """Return the files, and the differences from ``up``."""
+    """Return the files to write, and sentences about the differences from ``up``."""
     from tfcompose.tools.exporters.supervisors import Machine
 
-    relative = Path(os.path.relpath(file.parent, folder)).as_posix()
+    plan_folder = Path(os.path.relpath(file.parent, folder)).as_posix()
+    if arguments.at:
+        plan_folder = Path(arguments.at).absolute().as_posix()
     if arguments.kind == "launch":
         from tfcompose.cli.plans import is_plan
         from tfcompose.cli.reading import read_text
         from tfcompose.model.plan import STOCK_DESCRIPTION
         from tfcompose.tools.exporters.launch import launch
+        from tfcompose.tools.exporters.launch_frontends import LaunchFile
 
         urdf = read_text(str(file.parent / STOCK_DESCRIPTION))
+        launch_file = LaunchFile(plan_folder, arguments.form or "python")
         if is_plan(arguments.file):
-            return launch(plan, Machine(relative), urdf)
+            return launch(plan, launch_file, urdf)
         from tfcompose.tools.exporters.launch_arguments import collect_launch_values
 
         values, further, fixed = collect_launch_values(arguments, plan)
-        files, gaps = launch(plan, Machine(relative), urdf, values)
+        launch_file = replace(launch_file, place_of=partial(_place_in_robot_file, arguments))
+        files, gaps = launch(plan, launch_file, urdf, values)
         return (*files, *further), [*gaps, *fixed]
     if arguments.kind == "compose":
         from tfcompose.tools.exporters.supervisors import compose
 
-        return compose(plan, Machine(relative, image=arguments.image))
+        return compose(plan, Machine(plan_folder, image=arguments.image))
     if arguments.kind == "k8s":
         return _for_kubernetes(plan, file.parent, arguments)
     from tfcompose.tools.exporters.supervisors import systemd
@@ -201,17 +217,30 @@ def _export(
     host = plan.hosts.get(plan.host or "")
     setup = tuple(arguments.setup) or (host.setup if host else ())
     python = arguments.python or (host.python if host else None) or sys.executable
-    own = (
+    variables = (
         {} if setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
     )
-    at = Path(arguments.at or file.parent).absolute().as_posix()
-    return systemd(plan, Machine(at, python, setup, own))
+    folder_on_robot = Path(arguments.at or file.parent).absolute().as_posix()
+    return systemd(plan, Machine(folder_on_robot, python, setup, variables))
+
+
+def _place_in_robot_file(arguments: Namespace, process: str, key: str) -> Span | None:
+    """Return the location of a process's key or, if the key is missing, of the process."""
+    from tfcompose.cli.compiling import compile_file
+
+    compiled = compile_file(arguments.file, arguments)
+    span = compiled.sources[0].exact_span(("processes", process, key))
+    processes = compiled.robot.processes if compiled.robot else ()
+    return span or next((each.span for each in processes if each.name == process), None)
 
 
 def _for_kubernetes(
     plan: Plan, folder: Path, arguments: Namespace
 ) -> tuple[tuple[File, ...], list[str]]:
-    """Return the manifests, with the files of the built folder that the pods read."""
+    """Return the manifests, and the differences from ``up``.
+
+    The manifests contain the files of the built folder that the pods read.
+    """
     from tfcompose.cli.reading import read_text
     from tfcompose.tools.exporters.kubernetes import MOST_BYTES, Cluster, files_of, kubernetes
 

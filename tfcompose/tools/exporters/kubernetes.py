@@ -1,10 +1,10 @@
-"""A plan for Kubernetes: a ConfigMap, a workload per process, and a kustomization.
+"""Export for Kubernetes: a ConfigMap, a workload for each process, and a kustomization.
 
-A process that keeps running is a StatefulSet of one pod, because only a StatefulSet promises at
-most one: it starts no second pod before the first has ended, in an update, after a deletion or
-when a node is lost, so that no edge has two publishers
-(https://kubernetes.io/docs/concepts/workloads/controllers/statefulset/). A Deployment does not,
-even with ``Recreate``.
+A process that keeps running becomes a StatefulSet with a single pod. A StatefulSet starts a new
+pod only after the old pod has ended, even in an update, after a deletion or after the loss of a
+node. Therefore no edge ever has two publishers
+(https://kubernetes.io/docs/concepts/workloads/controllers/statefulset/). A Deployment can run two
+pods at the same time, even with the strategy ``Recreate``.
 """
 
 from __future__ import annotations
@@ -42,41 +42,42 @@ if TYPE_CHECKING:
     from tfcompose.model.process_keys import Exported
 
 _KUBERNETES = tuple(key.kubernetes for key in PROCESS_KEYS)
-#: How much a ConfigMap takes, in bytes
+#: The maximum size of a ConfigMap, in bytes
 #: (https://kubernetes.io/docs/concepts/configuration/configmap/).
 MOST_BYTES = 1_000_000
-#: The longest name of a workload, so that names and labels of its pods have at most 63 characters.
+#: The maximum length of a workload's name. The names and labels of its pods then have at most 63
+#: characters, which is Kubernetes's limit.
 _LONGEST = 48
 _PLAN = "plan.json"
-#: A file that a process names by its place in the plan's folder.
+#: A path in the plan's folder, as a process's command or environment contains it.
 _IN_FOLDER = re.compile(r"\$\{build_dir\}/(?!\.\.)([^\s\"',:;]+)")
 _NO_KEY = re.compile(r"[^A-Za-z0-9_.-]")
 _ROBOT, _PROCESS = "app.kubernetes.io/part-of", "app.kubernetes.io/name"
-#: Of a pod: a digest of what the process is started with, so that a new plan restarts what it
-#: changes, and no other.
+#: An annotation of a pod: the digest of everything that the process starts with. If a new plan
+#: changes the digest, Kubernetes restarts the pod; it keeps all other pods running.
 _CONTENT = "tfcompose/content"
 
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """The environment of the pods."""
+    """Properties of the cluster in which the pods run."""
 
     image: str
-    #: The plan's folder on each node; empty: a ConfigMap holds the plan.
+    #: The plan's folder on each node. If empty, a ConfigMap holds the plan.
     folder: str = ""
 
 
 def cluster_name(name: str) -> str:
-    """Return the name as an RFC 1123 label, which Kubernetes requires."""
+    """Return the name as an RFC 1123 label, because Kubernetes accepts no other names."""
     return re.sub(r"[^a-z0-9]+", "-", plain_name(name).lower())[:_LONGEST].strip("-") or "robot"
 
 
 def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
-    """Return the files in the plan's folder that the process reads, by relative path.
+    """Return the relative paths of the files in the plan's folder that the process reads.
 
-    The plan is first.
+    The plan is the first file.
     """
-    files = {found for argument in process.texts for found in _IN_FOLDER.findall(argument)}
+    files = {path for argument in process.texts for path in _IN_FOLDER.findall(argument)}
     if process.params_file:
         files.add(process.params_file)
     if plan.describes(process):
@@ -87,9 +88,10 @@ def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
 def kubernetes(
     plan: Plan, cluster: Cluster, texts: Mapping[str, str]
 ) -> tuple[tuple[File, ...], list[str]]:
-    """Return the manifests, and the properties of the plan that they lose.
+    """Return the manifests, and a sentence for each property of the plan that they do not keep.
 
-    ``texts`` are the files of all processes, ``files_of``, by their paths in the plan's folder.
+    ``texts`` maps the paths that ``files_of`` returns for all processes to the texts of these
+    files.
     """
     robot = cluster_name(plan.robot)
     names = plain_names(plan, lambda name: cluster_name(f"{robot}-{name}"))
@@ -120,7 +122,7 @@ def _settings(exported: Exported, section: str) -> dict[str, Any]:
 
 
 def _gaps(plan: Plan) -> list[str]:
-    """Return what Kubernetes does otherwise, one sentence each."""
+    """Return a sentence for each difference between Kubernetes and ``up``."""
     gaps = gaps_of(plan, _KUBERNETES) + outside_of(plan, INSIDE)
     for process in plan.started:
         for name, what in after(plan, process).items():
@@ -132,9 +134,10 @@ def _gaps(plan: Plan) -> list[str]:
 
 
 def _waiting_for(plan: Plan, name: str, what: str) -> list[str]:
-    """Return the command that succeeds when the process is as it is waited for.
+    """Return the command that succeeds once another process may start.
 
-    Empty where a pod cannot see that.
+    ``name`` is the process that the other waits for, and ``what`` is the condition after it, such
+    as ``ready``. The command is empty if a pod cannot test the condition.
     """
     process = plan.process(name)
     if seconds := waiting_s(process, what):
@@ -162,7 +165,7 @@ def _manifest(
 
 
 def _service(robot: str) -> dict[str, Any]:
-    """Return the headless service that a StatefulSet has to name; DDS does not use it."""
+    """Return the headless service that a StatefulSet must name, although DDS does not use it."""
     spec = {"clusterIP": "None", "selector": {_ROBOT: robot}}
     return _manifest("Service", "v1", robot, robot, {"spec": spec})
 
@@ -174,14 +177,14 @@ def _config_map(robot: str, texts: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _keys(texts: Mapping[str, str]) -> dict[str, str]:
-    """Return the key of each file, by its path; a ConfigMap has no folders."""
+    """Return the key of each file in the ConfigMap, by path; a key cannot contain a folder."""
     return distinct(texts.keys(), lambda path: _NO_KEY.sub("_", path))
 
 
 def _stateful_set(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
-    """Return a workload that runs on.
+    """Return the workload of a process that keeps running.
 
-    With ``Parallel`` an update replaces a pod that never became ready, too.
+    With ``Parallel``, an update also replaces a pod that never became ready.
     """
     spec = {
         "serviceName": robot,
@@ -194,9 +197,9 @@ def _stateful_set(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
 
 
 def _job(name: str, robot: str, pod: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return a workload that ends.
+    """Return the workload of a process that ends.
 
-    Its name changes with its content, because a job cannot be changed.
+    Its name contains a digest of its content, because Kubernetes cannot change an existing Job.
     """
     content = pod["metadata"]["annotations"][_CONTENT]
     template = {**pod, "spec": {**pod["spec"], "restartPolicy": "OnFailure"}}
@@ -211,7 +214,10 @@ def _pod(
     cluster: Cluster,
     texts: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Return the process's pod template, on its node's network and shared memory for DDS."""
+    """Return the pod template of a process.
+
+    The pod uses the network and the shared memory of its node, because DDS needs both.
+    """
     process = exported.process
     common = {
         "image": cluster.image,
@@ -253,9 +259,9 @@ def _pod(
 
 
 def _node_selector(plan: Plan, host: str) -> dict[str, str]:
-    """Return the labels of the node that is the host.
+    """Return the labels that select the node for a host.
 
-    Those that the robot file gives it, else its host name.
+    These are the ``node_selector`` of the host in the robot file or, without it, the host name.
     """
     declared = plan.hosts.get(host)
     return (
@@ -266,17 +272,20 @@ def _node_selector(plan: Plan, host: str) -> dict[str, str]:
 
 
 def _digest(plan: Plan, process: PlanProcess, texts: Mapping[str, str]) -> str:
-    """Return the digest of what the process is started with.
-
-    Its part of the plan, and the files that it reads.
-    """
+    """Return the digest of the process's part of the plan and of the files that it reads."""
     files = [texts[path] for path in files_of(plan, process) if path != _PLAN]
-    data = msgspec.json.encode([plan.start_settings(process), files])
+    poses = [
+        edge.pose for edge in plan.edges_of(process.name)
+    ]  # a pod reads its plan at the start
+    data = msgspec.json.encode([plan.start_settings(process), poses, files])
     return hashlib.sha256(data).hexdigest()[:16]
 
 
 def _environment(plan: Plan) -> dict[str, str]:
-    """Return what the probes need as well as the process, which has more from the plan."""
+    """Return the environment variables that the probes need.
+
+    The process itself gets more variables from the plan.
+    """
     discovery = (
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
     )
@@ -288,10 +297,7 @@ def _environment(plan: Plan) -> dict[str, str]:
 
 
 def _probes(plan: Plan, process: PlanProcess) -> dict[str, Any]:
-    """Return what tells the kubelet that the process has come up, and that it still lives.
-
-    An edge of its own.
-    """
+    """Return the startup and liveness probes of an owner, which test its first edge."""
     if not plan.edges_of(process.name):
         return {}
     probe = {"exec": {"command": probe_of(plan, process)}, "timeoutSeconds": 10}
@@ -312,5 +318,5 @@ def _volume(
 
 
 def _escape(text: str) -> str:
-    """Return the text as Kubernetes reads it back: it fills in ``$(NAME)`` itself."""
+    """Escape the text, because Kubernetes replaces ``$(NAME)`` by a variable."""
     return text.replace("$(", "$$(")

@@ -1,56 +1,44 @@
-"""Arguments of a robot file that the exported launch file keeps as arguments.
+"""Arguments of a robot file that become launch arguments in the exported launch file.
 
-An argument is kept if it only decides whether processes start, and their command-line arguments,
-parameters, remappings and variables. Any other argument has the value given to the export, or its
-default.
+An argument of the robot file becomes a launch argument if it affects only the conditions,
+command-line arguments, parameters, remappings and environment variables of processes. Any other
+argument is fixed: the launch file contains the value that the argument has during the export.
 """
 
 from __future__ import annotations
 
-import os
 import re
+from argparse import Namespace
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.compiling import disk_of, inputs_of, library, overlays_of
-from tfcompose.cli.reading import read_text
+from tfcompose.cli.compiling import compile_file, inputs_of, load_robot, overlays_of
 from tfcompose.cli.writing import destination
-from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.emit import emit
-from tfcompose.foundation.findings import Span
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import OWN_KINDS
 from tfcompose.spec.language import (
-    ArgValue,
-    BuildInputs,
     compose,
     profiles_in,
     validate,
-    with_includes,
 )
 from tfcompose.spec.language.args import as_given
 from tfcompose.spec.language.argument_uses import HOLE, names_of, uses_of
 from tfcompose.spec.language.arguments import values_that_satisfy
 from tfcompose.spec.language.expressions import environment_in, names_in
 from tfcompose.spec.language.values import plain
-from tfcompose.spec.load import load
-from tfcompose.tools.exporters.launch_values import (
-    ArgumentValue,
-    LaunchArgument,
-    LaunchValues,
-    Text,
-    VariableValue,
-    condition_code,
-)
+from tfcompose.tools.exporters.launch_texts import ArgumentValue, VariableValue
+from tfcompose.tools.exporters.launch_values import LaunchArgument, LaunchValues, condition_of
 
 if TYPE_CHECKING:
-    from argparse import Namespace
     from collections.abc import Mapping
 
     from tfcompose.model.files import File
     from tfcompose.model.plan import Plan, PlanProcess
     from tfcompose.spec.language import ArgSpec
     from tfcompose.spec.language.argument_uses import ArgumentUses
+    from tfcompose.tools.exporters.launch_texts import Text
+
 
 _ARGUMENT = re.compile(r"\s*args\.([A-Za-z_][A-Za-z0-9_]*)\s*")
 
@@ -58,38 +46,35 @@ _ARGUMENT = re.compile(r"\s*args\.([A-Za-z_][A-Za-z0-9_]*)\s*")
 def collect_launch_values(
     arguments: Namespace, plan: Plan
 ) -> tuple[LaunchValues, tuple[File, ...], list[str]]:
-    """Return the launch file's values, the files it needs, and the fixed arguments.
+    """Return the launch file's values, the files that it needs, and the fixed arguments.
 
-    ``plan`` is the built one. The robot file has no errors.
+    ``plan`` is the built plan. The robot file must have no errors.
     """
-    source = compose(
-        with_includes(load(read_text(arguments.file), arguments.file), read_text),
-        arguments.profiles,
-        overlays_of(arguments),
-        inputs_of(arguments),
-    )
+    robot_file = load_robot(arguments.file)
+    overlays = overlays_of(arguments, robot_file)
+    source = compose(robot_file, arguments.profiles, overlays, inputs_of(arguments))
     uses = uses_of(source)
     validated = validate(source, profiles_in(source), inputs_of(arguments))
     specs, values = validated.spec.args, validated.args
     kinds = {name: spec.kind for name, spec in specs.items()}
     _fix_conditions(uses, kinds)
-    there = {process.name: process for process in plan.managed}
+    managed = {process.name: process for process in plan.managed}
     combined = _Combinations(arguments, plan, specs, values)
     missing = {
-        name: expression for name, expression in uses.conditions.items() if name not in there
+        name: expression for name, expression in uses.conditions.items() if name not in managed
     }
     more = {
-        name: found
+        name: addition
         for name, expression in missing.items()
-        if (found := combined.process(name, expression))
+        if (addition := combined.process(name, expression))
     }
     for name, expression in uses.conditions.items():
-        if name not in there and name not in more:
+        if name not in managed and name not in more:
             uses.fix(f"${{{expression}}}")
     kept, conditions = _settle(uses, kinds)
     texts: dict[str, dict[str, Text]] = defaultdict(dict)
     for (process, place), text in kept.items():
-        if process in there or process in more:
+        if process in managed or process in more:
             texts[process][place] = _text(text, kinds)
     used = {
         part.name
@@ -121,7 +106,7 @@ def collect_launch_values(
         for name, value in values.items()
         if name not in used and f"args.{name}" in uses.fixed
     ]
-    added = {name: found for name, found in more.items() if name in conditions}
+    added = {name: addition for name, addition in more.items() if name in conditions}
     files = tuple(file for _, files_added in added.values() for file in files_added)
     return (
         LaunchValues(declared, conditions, texts, tuple(process for process, _ in added.values())),
@@ -142,10 +127,10 @@ def _argument(name: str, spec: ArgSpec, value: Any) -> LaunchArgument:
 
 
 def _fix_conditions(uses: ArgumentUses, kinds: Mapping[str, str]) -> None:
-    """Take conditions that launch cannot compute as something else that needs their arguments."""
+    """Fix the arguments of conditions that launch cannot compute."""
     for name, expression in list(uses.conditions.items()):
         try:
-            condition_code(expression, kinds)
+            condition_of(expression, kinds)
         except ValueError:
             uses.fix(f"${{{uses.conditions.pop(name)}}}")
 
@@ -153,9 +138,10 @@ def _fix_conditions(uses: ArgumentUses, kinds: Mapping[str, str]) -> None:
 def _settle(
     uses: ArgumentUses, kinds: Mapping[str, str]
 ) -> tuple[dict[tuple[str, str], str], dict[str, str]]:
-    """Return the texts and conditions that launch computes.
+    """Return the texts and conditions that contain only launch arguments.
 
-    Those of which nothing else needs an argument.
+    A text or condition that contains a fixed argument fixes its other arguments too. The function
+    therefore repeats until no argument is added.
     """
     texts, conditions = dict(uses.texts), dict(uses.conditions)
     for path, text in uses.texts.items():
@@ -175,7 +161,7 @@ def _settle(
 
 
 def _parts(text: str, kinds: Mapping[str, str]) -> Text | None:
-    """Return what a text consists of, or None where launch cannot compute something of it."""
+    """Split a text into plain parts and values; return None if launch cannot compute a value."""
     parts: list[str | ArgumentValue | VariableValue] = []
     end = 0
     for hole in HOLE.finditer(text):
@@ -196,7 +182,7 @@ def _text(text: str, kinds: Mapping[str, str]) -> Text:
 
 
 class _Combinations:
-    """Processes that are there with other values of the arguments alone."""
+    """Builds of the robot with other arguments, for processes that the plan does not have."""
 
     def __init__(
         self,
@@ -210,22 +196,21 @@ class _Combinations:
         self._built: dict[tuple[tuple[str, str], ...], tuple[Plan, tuple[File, ...]] | None] = {}
 
     def process(self, name: str, expression: str) -> tuple[PlanProcess, tuple[File, ...]] | None:
-        """Return a process as it is where its condition holds, with its parameter file.
+        """Return the process and its parameter file from a build in which its condition is true.
 
-        None where it cannot be added.
-
-        It cannot where the robot has errors or another tree then, or launch would need its plan.
+        Return None if that build has errors or other edges, or if launch would need the plan of
+        that build to start the process.
         """
         for values in values_that_satisfy(expression, self.specs, self.values):
             plan, files = self._build(values) or (self.plan, ())
-            found = next((process for process in plan.managed if process.name == name), None)
+            candidate = next((process for process in plan.managed if process.name == name), None)
             if (
-                found is not None
-                and found.kind in {"run", "component"}
+                candidate is not None
+                and candidate.kind in {"run", "component"}
                 and _own_edges(plan) == _own_edges(self.plan)
             ):
-                needed = tuple(file for file in files if file.path == found.params_file)
-                return found, needed
+                needed = tuple(file for file in files if file.path == candidate.params_file)
+                return candidate, needed
         return None
 
     def _build(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
@@ -235,21 +220,9 @@ class _Combinations:
         return self._built[key]
 
     def _compile(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
-        arguments = self.arguments
-        args = {
-            name: ArgValue(value, Span(f"{name}:={value}"))
-            for name, value in (self.values | values).items()
-        }
-        compiled: Compiled = compile_robot(
-            read_text(arguments.file),
-            arguments.file,
-            library(),
-            arguments.profiles,
-            overlays=overlays_of(arguments),
-            read=read_text,
-            disk=disk_of(arguments.file, arguments),
-            inputs=BuildInputs(args, os.environ),
-        )
+        changed = {"arg_values": self.values | values}
+        arguments = Namespace(**{**vars(self.arguments), **changed})
+        compiled = compile_file(arguments.file, arguments)
         if compiled.robot is None or compiled.errors:
             return None
         files = emit(compiled.robot, destination(arguments, compiled.robot)[1])
@@ -257,10 +230,10 @@ class _Combinations:
 
 
 def _own_edges(plan: Plan) -> set[tuple[Any, ...]]:
-    """Return what tfcompose's own publishers send."""
-    own = {process.name for process in plan.started if process.kind in OWN_KINDS}
+    """Return the edges of tfcompose's own publishers, with their poses."""
+    owners = {process.name for process in plan.started if process.kind in OWN_KINDS}
     return {
         (edge.parent, edge.child, edge.kind, edge.pose.xyz, edge.pose.quat_xyzw)
         for edge in plan.edges
-        if edge.owner in own
+        if edge.owner in owners
     }

@@ -1,27 +1,26 @@
-"""Values that an exported launch file decides at its start: arguments, environment, conditions.
+"""Arguments, texts and conditions that an exported launch file evaluates when it starts.
 
-A plan has the values of its build. A launch file can keep the arguments that only decide whether
-processes start and which texts they get.
+A plan contains fixed values from its build. A launch file can keep an argument of the robot file
+if the argument affects only conditions and texts of processes.
 """
 
 from __future__ import annotations
 
 import ast
 from dataclasses import dataclass, field
-from functools import reduce
 from typing import TYPE_CHECKING
 
 from tfcompose.spec.language.expressions import constant, parse
-from tfcompose.tools.exporters.code import CodeBlock, call, items
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.model.plan import PlanProcess
     from tfcompose.spec.language.expressions import Expression
+    from tfcompose.tools.exporters.launch_texts import Text
 
-#: launch's substitutions for the signs of expressions; others are left to Python.
-_EQUALITY = {ast.Eq: "EqualsSubstitution", ast.NotEq: "NotEqualsSubstitution"}
+
+_EQUALITY = {ast.Eq: "==", ast.NotEq: "!="}
 _ORDER: dict[type[ast.cmpop], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
 _FLIPPED: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.Gt,
@@ -29,7 +28,6 @@ _FLIPPED: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Gt: ast.Lt,
     ast.GtE: ast.LtE,
 }
-_TYPES = {"bool": "bool", "int": "int", "float": "float", "string": "str"}
 _TRUTHS = ("true", "false")
 
 
@@ -38,55 +36,71 @@ class LaunchArgument:
     """A launch argument."""
 
     name: str
-    #: bool, int, float or string.
+    #: The type of the argument: bool, int, float or string.
     kind: str
     default: str
     choices: tuple[str, ...] = ()
     description: str = ""
-    #: An environment variable that gives the default.
+    #: The environment variable that sets the default, if any.
     env: str | None = None
 
-    def code(self) -> CodeBlock:
-        """Return the code that declares it."""
-        default: CodeBlock | str = repr(self.default)
-        if self.env:
-            default = call(
-                "EnvironmentVariable", repr(self.env), f"default_value={self.default!r}"
-            )
-        parts: list[CodeBlock | str] = [repr(self.name), f"default_value={default}"]
-        parts += [items(map(repr, self.choices), "choices")] if self.choices else []
-        parts += [f"description={self.description!r}"] if self.description else []
-        return call("DeclareLaunchArgument", *parts)
+
+@dataclass(frozen=True, slots=True)
+class TruthValue:
+    """The value of a bool argument, or a constant."""
+
+    #: The argument's name, or ``true`` or ``false``.
+    text: str
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the text is ``true`` or ``false`` instead of an argument."""
+        return self.text in _TRUTHS
 
 
 @dataclass(frozen=True, slots=True)
-class ArgumentValue:
-    """The value of an argument, as a part of a text or as all of it."""
+class Negation:
+    """True if the condition is false."""
 
-    name: str
-    kind: str
+    condition: Condition
 
 
 @dataclass(frozen=True, slots=True)
-class VariableValue:
-    """The value of an environment variable, or its default."""
+class Junction:
+    """Two conditions, joined by an operator."""
+
+    #: ``and`` or ``or``.
+    operator: str
+    left: Condition
+    right: Condition
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """An argument's value, compared with a constant."""
 
     name: str
-    default: str | None
+    #: ``==``, ``!=``, ``<``, ``<=``, ``>`` or ``>=``.
+    sign: str
+    value: str
+
+    @property
+    def is_of_order(self) -> bool:
+        """Whether the sign is an inequality of numbers, such as ``<``."""
+        return self.sign in _ORDER.values()
 
 
-#: A text with what it inserts, in order.
-Text = tuple[str | ArgumentValue | VariableValue, ...]
+Condition = TruthValue | Negation | Junction | Comparison
 
 
 @dataclass(frozen=True, slots=True)
 class LaunchValues:
-    """Values that a launch file decides at its start."""
+    """Values that a launch file evaluates when it starts."""
 
     arguments: tuple[LaunchArgument, ...] = ()
-    #: Expressions, by process.
+    #: Conditions of processes as expressions of the robot file, by process.
     conditions: Mapping[str, str] = field(default_factory=dict)
-    #: Texts by process and then by place: ``args.0``, ``env.NAME``, ``params.NAME`` or
+    #: Texts by process and then by key: ``args.0``, ``env.NAME``, ``params.NAME`` or
     #: ``remap.NAME``.
     texts: Mapping[str, Mapping[str, Text]] = field(default_factory=dict)
     #: Processes that exist only for other values of the arguments. Their parameter files are next
@@ -95,73 +109,47 @@ class LaunchValues:
 
     @property
     def kinds(self) -> dict[str, str]:
-        """The arguments' kinds, by name."""
+        """The types of the arguments, by name."""
         return {argument.name: argument.kind for argument in self.arguments}
 
 
-def text_code(text: Text) -> CodeBlock | str:
-    """Return the substitutions for a text."""
-    parts = [_part(part) for part in text]
-    return parts[0] if len(parts) == 1 else items(parts)
-
-
-def parameter_code(text: Text) -> CodeBlock | str:
-    """Return the substitutions for a parameter's value, with its type."""
-    only, *rest = text
-    kind = _TYPES[only.kind] if not rest and isinstance(only, ArgumentValue) else "str"
-    return call("ParameterValue", text_code(text), f"value_type={kind}")
-
-
-def _part(part: str | ArgumentValue | VariableValue) -> CodeBlock | str:
-    if isinstance(part, str):
-        return repr(part)
-    if isinstance(part, ArgumentValue):
-        return call("LaunchConfiguration", repr(part.name))
-    default = [] if part.default is None else [f"default_value={part.default!r}"]
-    return call("EnvironmentVariable", repr(part.name), *default)
-
-
-def condition_code(expression: str, kinds: Mapping[str, str]) -> CodeBlock:
+def condition_of(expression: str, kinds: Mapping[str, str]) -> Condition:
     """Return launch's condition for an expression of a robot file.
 
     Raises:
-        ValueError: if launch has none.
+        ValueError: if launch cannot express the condition.
     """
     parsed = parse(expression)
-    match parsed.body:
-        case ast.UnaryOp(op=ast.Not(), operand=inner):
-            return call("UnlessCondition", _truth(inner, parsed, kinds))
-    return call("IfCondition", _truth(parsed.body, parsed, kinds))
+    return _condition(parsed.body, parsed, kinds)
 
 
-def _truth(node: ast.expr, expression: Expression, kinds: Mapping[str, str]) -> CodeBlock | str:
+def _condition(node: ast.expr, expression: Expression, kinds: Mapping[str, str]) -> Condition:
     match node:
-        case ast.BoolOp(op=op, values=values):
-            name = "AndSubstitution" if isinstance(op, ast.And) else "OrSubstitution"
-            conditions = [_truth(value, expression, kinds) for value in values]
-            return reduce(lambda left, right: call(name, left, right), conditions)
+        case ast.BoolOp(op=op, values=[first, *rest]):
+            operator = "and" if isinstance(op, ast.And) else "or"
+            condition = _condition(first, expression, kinds)
+            for value in rest:
+                condition = Junction(operator, condition, _condition(value, expression, kinds))
+            return condition
         case ast.UnaryOp(op=ast.Not(), operand=inner):
-            return call("NotSubstitution", _truth(inner, expression, kinds))
+            return Negation(_condition(inner, expression, kinds))
         case ast.Compare(left=left, ops=[op], comparators=[right]):
             return _comparison(expression.operand(left), op, expression.operand(right), kinds)
     operand = expression.operand(node)
-    if operand in _TRUTHS:
-        return repr(operand)
     name = operand.removeprefix("args.")
-    if kinds.get(name) != "bool" or name == operand:
+    if operand not in _TRUTHS and (kinds.get(name) != "bool" or name == operand):
         raise ValueError(expression.text)
-    return call("LaunchConfiguration", repr(name))
+    return TruthValue(name)
 
 
-def _comparison(left: str, op: ast.cmpop, right: str, kinds: Mapping[str, str]) -> CodeBlock:
+def _comparison(left: str, op: ast.cmpop, right: str, kinds: Mapping[str, str]) -> Condition:
     if not left.startswith("args."):
         left, right, op = right, left, _FLIPPED.get(type(op), type(op))()
     name, value = left.removeprefix("args."), constant(right)
     if name not in kinds or name == left or value is None:
         raise ValueError(left)
-    configuration = call("LaunchConfiguration", repr(name))
     if type(op) in _EQUALITY:
-        return call(_EQUALITY[type(op)], configuration, repr(value))
+        return Comparison(name, _EQUALITY[type(op)], value)
     if type(op) not in _ORDER or kinds[name] not in {"int", "float"}:
         raise ValueError(left)
-    return call("PythonExpression", items([configuration, repr(f" {_ORDER[type(op)]} {value}")]))
+    return Comparison(name, _ORDER[type(op)], value)

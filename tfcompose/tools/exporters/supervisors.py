@@ -1,7 +1,7 @@
-"""A plan for other supervisors: a systemd unit or a docker compose service per process.
+"""Export for systemd and Docker Compose: a unit or a service for each process.
 
-The first part is shared with ``kubernetes``: names, start order, restarts, probes and the YAML of
-the files.
+``kubernetes`` uses the first part of this module too: names, start order, restarts, probes and the
+YAML writer.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_.]+")
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The environment in which an export runs."""
+    """Folders and files on the machine that runs the exported files."""
 
-    #: The plan's folder: absolute for systemd, relative to the written file for the others.
+    #: The plan's folder: absolute or, for compose only, relative to the written file.
     folder: str
     python: str = "python3"
     #: Setup files to source, in order.
@@ -51,17 +51,17 @@ def plain_name(name: str) -> str:
 
 
 def plain_names(plan: Plan, plain_of: Callable[[str], str] = plain_name) -> dict[str, str]:
-    """Return each process's plain name, by its own name.
+    """Return a plain name for each process, by the name of the process.
 
-    Plain names are unique, and a name that is already plain is kept.
+    Plain names are unique. A name that is already plain does not change.
     """
     return distinct([process.name for process in plan.processes], plain_of)
 
 
 def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str, str]:
-    """Return the plain form of each name, by the name.
+    """Return a plain name for each name.
 
-    Plain names are unique, and a name that is already plain is kept.
+    Plain names are unique. A name that is already plain does not change.
     """
     made = {name: name for name in names if plain_of(name) == name}
     names_in_use = set(made)
@@ -95,9 +95,9 @@ def settings_of(dialects: Iterable[Dialect], exported: Exported) -> list[Setting
 
 
 def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
-    """Return the processes that start before this one, and the condition on each.
+    """Return the processes that must start before this process, each with its condition.
 
-    A strict guard is among them. A component is replaced by its container.
+    A strict guard is one of these processes. A component counts as its container.
     """
     waits: dict[str, str] = {}
     for name, what in process.after.items():
@@ -115,15 +115,15 @@ def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
 
 
 def waiting_s(process: PlanProcess, what: str) -> float:
-    """Return the known delay in seconds between a process's start and its readiness, else 0."""
+    """Return the time in seconds from a process's start until it is ready; 0 if unknown."""
     ready = process.ready
     return ready.number if what == "ready" and ready and ready.kind == "time" else 0.0
 
 
 def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
-    """Return the properties of the plan that a supervisor without ROS loses, a sentence each.
+    """Return a sentence for each property of the plan that a supervisor without ROS loses.
 
-    ``dialects`` translate the keys of a process for it.
+    ``dialects`` translate the keys of a process for this supervisor.
     """
     exported = exported_processes(plan)
     gaps = []
@@ -146,16 +146,16 @@ def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
                     f"{process.name} does not wait for {name}: the guard loads it once"
                     f" {component.container} runs"
                 )
-            elif not component and (other := plan.process(name).component):
+            elif not component and (awaited := plan.process(name).component):
                 gaps.append(
-                    f"{process.name} waits for the container {other.container}, but not for"
+                    f"{process.name} waits for the container {awaited.container}, but not for"
                     f" {name} in it"
                 )
     return gaps
 
 
-#: A probe does not come through the image's entry point, which sources the setup file for the
-#: process itself.
+#: The container engine runs a probe without the image's entry point, so the probe must source the
+#: setup file itself.
 _SOURCED = (
     'setup=/opt/ros/${ROS_DISTRO:-RELEASE}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
 )
@@ -164,7 +164,8 @@ _SOURCED = (
 def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
     """Return the command that succeeds while the process's first edge is live.
 
-    It checks only one edge, because each check is a process that joins the robot's domain.
+    The command checks only the first edge, because each check is a process that joins the ROS
+    domain.
     """
     edge = plan.edges_of(process.name)[0]
     argv = [
@@ -182,7 +183,7 @@ def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
 
 
 def outside_of(plan: Plan, folder: str) -> list[str]:
-    """Return sentences about requirements that a container with the plan's folder lacks."""
+    """Return a sentence for each requirement that is not in the plan's folder."""
     gaps = []
     for process in plan.started:
         outside = [argument for argument in process.texts if "${build_dir}/.." in argument]
@@ -194,7 +195,7 @@ def outside_of(plan: Plan, folder: str) -> list[str]:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes each string that some reader of YAML, 1.1 or 1.2, could take for something else."""
+    """Writes YAML, and quotes each string that YAML 1.1 or 1.2 could read as another type."""
 
     def ignore_aliases(self, data: object) -> bool:
         """Write repeated values in full, without YAML aliases."""
@@ -207,7 +208,7 @@ class _Dumper(yaml.SafeDumper):
         super().increase_indent(flow, indentless=False)
 
 
-#: What no YAML takes for a number, a date, a truth value or null.
+#: Strings that no version of YAML reads as a number, a date, a truth value or null.
 _UNQUOTED = re.compile(
     r"(?!(?:y|n|yes|no|on|off|true|false|null|inf|nan)\Z)[A-Za-z/][A-Za-z0-9_./-]*", re.IGNORECASE
 )
@@ -227,12 +228,13 @@ def yaml_text(value: Mapping[str, Any]) -> str:
 
 
 def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
-    """Return the units, and the properties of the plan that they lose.
+    """Return the units, and a sentence for each property of the plan that they do not keep.
 
     tfcompose's own processes notify systemd when they are ready (``Type=notify``), so ``After=``
-    waits for that. For other processes systemd only knows that they were executed. A process that
-    others wait for until it is done is ``Type=oneshot``. For a process that is ready a fixed time
-    after its start, systemd considers the start complete after a sleep of that time.
+    waits for that. For other processes, systemd only knows that it has executed the program. If
+    other processes wait until a process is done, its unit has ``Type=oneshot``. If a process is
+    ready a fixed time after its start, the unit sleeps for this time before systemd considers the
+    unit started.
     """
     exported = exported_processes(plan)
     names = {
@@ -249,13 +251,13 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     gaps = gaps_of(plan, _SYSTEMD)
     for process in plan.started:
         for name, what in process.after.items():
-            other = plan.process(name)
-            if what == "ready" and other.kind == "run" and not waiting_s(other, what):
+            awaited = plan.process(name)
+            if what == "ready" and awaited.kind == "run" and not waiting_s(awaited, what):
                 gaps.append(
                     f"{process.name} waits only until {name} was executed: systemd cannot tell"
                     " when it is ready"
                 )
-            if what == "started" and _settling_s(plan, other):
+            if what == "started" and _settling_s(plan, awaited):
                 gaps.append(f"{process.name} waits until {name} is ready, not only started")
     return (File(_target_name(plan), _target(plan, [unit.path for unit in units])), *units), gaps
 
@@ -265,16 +267,16 @@ def _target_name(plan: Plan) -> str:
 
 
 def _target(plan: Plan, units: list[str]) -> str:
-    wanted = "\n".join(f"Wants={unit}" for unit in units)
+    wants = "\n".join(f"Wants={unit}" for unit in units)
     return (
         f"[Unit]\nDescription=Robot {plan.robot}\n"
-        f"Wants=network-online.target\nAfter=network-online.target\n{wanted}\n\n"
+        f"Wants=network-online.target\nAfter=network-online.target\n{wants}\n\n"
         "[Install]\nWantedBy=default.target\n"
     )
 
 
 def _settling_s(plan: Plan, process: PlanProcess) -> float:
-    """Return how many seconds after its start others wait for a process; 0 where none does."""
+    """Return for how many seconds after its start other processes wait for this process."""
     name = process.name
     return max(
         (
@@ -287,7 +289,7 @@ def _settling_s(plan: Plan, process: PlanProcess) -> float:
 
 
 def _unit_text(plan: Plan, exported: Exported, machine: Machine, names: Mapping[str, str]) -> str:
-    """Return the unit of a process; ``names`` are those of all units, by process."""
+    """Return the unit of a process; ``names`` are the names of all units, by process."""
     process = exported.process
     target = _target_name(plan)
     before = [names[name] for name in after(plan, process)]
@@ -319,9 +321,9 @@ def _unit_text(plan: Plan, exported: Exported, machine: Machine, names: Mapping[
 
 
 def _logs(plan: Plan, machine: Machine) -> list[str]:
-    """Return where ROS logs to, unless that is set.
+    """Return the settings for ROS's log folder, unless the plan sets the folder.
 
-    No node starts without, and a system's service has no home.
+    No ROS node starts without a log folder, and a system service has no home folder.
     """
     if {"ROS_LOG_DIR", "ROS_HOME"} & machine.env.keys():
         return []
@@ -336,7 +338,7 @@ def _exec(process: PlanProcess, machine: Machine) -> str:
     return " ".join(quote(argument).replace("$", "$$") for argument in argv)
 
 
-#: Where the plan's folder is inside a container.
+#: The path of the plan's folder inside a container.
 INSIDE = "/robot"
 IMAGE = "${TFCOMPOSE_IMAGE:?set it to an image with ROS 2 Jazzy and tfcompose}"
 _MET = {
@@ -347,11 +349,11 @@ _MET = {
 
 
 def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
-    """Return the compose file, and the properties of the plan that it loses.
+    """Return the compose file, and a sentence for each property of the plan that it loses.
 
-    A process that owns edges is healthy while the first of them is live; ``after: ready`` waits
-    for that. A process on a host is in the profile of that name, and waits only for processes on
-    the same host.
+    A process that owns edges is healthy while its first edge is live; ``after: ready`` waits until
+    the process is healthy. A process with ``host`` is in the Compose profile of that name, and
+    waits only for processes on the same host.
     """
     names = plain_names(plan)
     exported = exported_processes(plan)
@@ -362,25 +364,26 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     gaps = gaps_of(plan, _COMPOSE)
     for process in plan.started:
         for name, what in process.after.items():
-            other = plan.process(name)
-            if what == "ready" and other.kind != "external" and not plan.edges_of(name):
+            awaited = plan.process(name)
+            if what == "ready" and awaited.kind != "external" and not plan.edges_of(name):
                 gaps.append(
                     f"{process.name} waits only until {name} was started: compose cannot tell"
                     " when it is ready"
                 )
-            if other.kind != "external" and _profile(plan, other) not in (
+            if awaited.kind != "external" and _profile(plan, awaited) not in (
                 None,
                 _profile(plan, process),
             ):
-                gaps.append(f"{process.name} does not wait for {name}, which is on {other.host}")
+                gaps.append(f"{process.name} does not wait for {name}, which is on {awaited.host}")
     text = yaml_text({"name": plain_name(plan.robot), "services": services})
     return (File("compose.yaml", text),), gaps + outside_of(plan, INSIDE)
 
 
 def _profile(plan: Plan, process: PlanProcess) -> str | None:
-    """Return the profile that a service is in.
+    """Return the Compose profile of a service.
 
-    Its host, unless the plan is one host's share already.
+    This is the host of the process. It is None if the plan contains only the processes of a single
+    host.
     """
     return plain_name(process.host) if process.host and plan.host is None else None
 
@@ -388,7 +391,7 @@ def _profile(plan: Plan, process: PlanProcess) -> str | None:
 def _compose_service(
     plan: Plan, exported: Exported, machine: Machine, names: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return the service of a process; ``names`` are those of all services, by process."""
+    """Return the service of a process; ``names`` are the names of all services, by process."""
     process = exported.process
     profile = _profile(plan, process)
     waits = {
@@ -432,7 +435,10 @@ def _compose_service(
 
 
 def _discovery(plan: Plan) -> dict[str, str]:
-    """Return what the health check needs; the process itself has it from the plan."""
+    """Return the environment variables that the health check needs.
+
+    The process itself gets these variables from the plan.
+    """
     discovery = (
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
     )
@@ -440,5 +446,5 @@ def _discovery(plan: Plan) -> dict[str, str]:
 
 
 def _escape(text: str) -> str:
-    """Return the text as compose reads it back: it fills in variables itself."""
+    """Escape the text, because Compose replaces ``$NAME`` by variables."""
     return text.replace("$", "$$")

@@ -1,10 +1,11 @@
-"""Export tool: a plan for systemd, docker compose, Kubernetes or ros2 launch."""
+"""The tool ``export``: it writes a plan for systemd, Docker Compose, Kubernetes or ros2 launch."""
 
 from tfcompose.foundation.tool import Command, Tool, Topic
 
 TOOL = Tool(
     name="export",
     package=__package__,
+    codes=__package__,
     commands=(
         Command(
             "export",

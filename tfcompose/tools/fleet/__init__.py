@@ -1,9 +1,10 @@
-"""Several robots: a few edges leave each of them over Zenoh, and are looked up together elsewhere.
+"""Fleets: robots share some of their edges over Zenoh, for lookups between robots.
 
-On the key ``tfcompose/fleet/FLEET/ROBOT/tf`` are TFMessages as ROS has them, in CDR, with the
-names of frames that they have in the fleet; ``…/tf_static`` holds all fixed edges, twice a second,
-and says by that that the robot is reached.
+A robot sends TFMessages, encoded as in ROS (CDR), on the Zenoh key
+``tfcompose/fleet/FLEET/ROBOT/tf``. Frames have their names in the fleet. On ``…/tf_static``, a
+robot sends all its fixed edges twice a second. These messages also show that the others can reach
+the robot.
 
-``check`` lints the file of a fleet, ``share`` and ``robot`` send from a robot, ``observe``
-receives anywhere.
+``check`` lints a fleet file. ``share`` and ``robot`` send the edges of a robot. ``observe``
+receives the edges of all robots.
 """

@@ -1,4 +1,4 @@
-"""Checks of a fleet file: edges that clash, and robots that are in no common tree."""
+"""Checks of a fleet file: edges that clash, and robots without a common tree."""
 
 from __future__ import annotations
 
@@ -14,30 +14,32 @@ if TYPE_CHECKING:
 
 
 def check_fleet(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
-    """Yield the findings of a fleet that could be read."""
+    """Yield the findings about a valid fleet file."""
     yield from _check_shared_twice(fleet, source)
     yield from _apart(fleet, source)
 
 
 def _check_shared_twice(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
-    """Yield a finding for each frame that two edges give a parent.
+    """Yield a finding for each frame that has two parents.
 
-    Lookups would jump between them.
+    Lookups would jump between the two.
     """
     first: dict[str, tuple[str, Path]] = {}
     for robot in fleet.robots:
         for index, shared in enumerate(fleet.edges_of(robot)):
             parent, child = (fleet.final(robot, frame) for frame in shared.ends)
             path = _path(fleet, robot, index)
-            other, place = first.setdefault(child, (robot, path))
-            if (other, place) == (robot, path):
+            first_robot, place = first.setdefault(child, (robot, path))
+            if (first_robot, place) == (robot, path):
                 continue
             message = (
-                f"{parent} → {child} of {robot} is a second parent of {child}, which {other}"
+                f"{parent} → {child} of {robot} is a second parent of {child}, which {first_robot}"
                 " shares"
             )
             advice = (
-                "give the robots different prefixes" if other != robot else "remove one of them"
+                "give the robots different prefixes"
+                if first_robot != robot
+                else "remove one of them"
             )
             notes = [Note("the other one", source.span_of(place))]
             yield finding("TF880", message, source.span_of(path), notes=notes, help=advice)
@@ -52,7 +54,7 @@ def _path(fleet: FleetSpec, robot: str, index: int) -> Path:
 
 
 def _apart(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
-    """Yield a finding for each robot whose frames are not in one tree with those of the first."""
+    """Yield a finding for each robot whose frames are not in the tree of the first robot."""
     trees: dict[str, set[str]] = {}
     for robot in fleet.robots:
         frames = {

@@ -33,29 +33,30 @@ if TYPE_CHECKING:
     from tfcompose.tools.fleet.observe import FleetObserver, FleetRobotStatus
     from tfcompose.tools.fleet.spec import FleetSpec
 
-#: What can be done, with the names that it takes.
+#: The actions of the command, with the names of their arguments.
 _ACTIONS = {"lint": (), "share": ("ROBOT",), "ps": (), "echo": ("A", "B"), "doctor": ()}
 _FILE = "fleet.yaml"
 _YAML = (".yaml", ".yml")
-#: A stale link is found within this time; a live one is known sooner.
+#: The time of observation in seconds. It is long enough to detect a stale link; a live link is
+#: known earlier.
 _OBSERVE_S = 3.0
 _HEAD = ("ROBOT", "STATE", "AGE", "EDGES", "ROUTER")
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
+    """Add the arguments of ``fleet``."""
     parser.add_argument("action", choices=_ACTIONS, help="the action, as above")
     parser.add_argument(
         "words",
         nargs="*",
         default=[],
         metavar="NAME|FILE",
-        help="ROBOT for share, A and B for echo; fleet.yaml",
+        help="share: ROBOT; echo: A B; last, optionally: the fleet file",
     )
     add_for(
         parser,
-        "ps and doctor: listen for S seconds; default: until every robot answers, at most 3; "
-        "echo: stop after S",
+        "ps and doctor: listen for S seconds; default: until every robot answers, at most 3 s; "
+        "echo: stop after S seconds",
     )
     parser.add_argument(
         "--rate",
@@ -74,12 +75,12 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Do it; exit code 0, 1 with findings, 2 for wrong use and what cannot be read."""
+    """Run the action; exit code 0, 1 with findings, 2 for wrong use or an unreadable file."""
     files = [argument for argument in arguments.words if argument.endswith(_YAML)]
     names = [argument for argument in arguments.words if not argument.endswith(_YAML)]
-    wanted = _ACTIONS[arguments.action]
-    if len(names) != len(wanted) or len(files) > 1:
-        usage = " ".join(["tfcompose fleet", arguments.action, *wanted, "[FILE]"])
+    operands = _ACTIONS[arguments.action]
+    if len(names) != len(operands) or len(files) > 1:
+        usage = " ".join(["tfcompose fleet", arguments.action, *operands, "[FILE]"])
         fail(f"fleet {arguments.action}: wrong number of names; usage: {usage}", UNREADABLE)
     spec, findings = _read(files[0] if files else _FILE)
     print_findings(findings, sys.stderr)
@@ -103,10 +104,10 @@ def run(arguments: Namespace) -> int:
 
 
 def refuse_without_zenoh() -> None:
-    """End the command where eclipse-zenoh is not installed.
+    """End the command if eclipse-zenoh is not installed.
 
     Raises:
-        SystemExit: after saying so.
+        SystemExit: after printing how to install it.
     """
     from tfcompose.foundation.findings import finding
     from tfcompose.tools.fleet.preflight import INSTALL
@@ -116,15 +117,15 @@ def refuse_without_zenoh() -> None:
 
 
 def _read(file: str) -> tuple[FleetSpec | None, list[Finding]]:
-    """Return the fleet of a file, None where it has errors, and all findings."""
+    """Return the fleet of a file (None if the file has errors), and all findings."""
     from tfcompose.cli.reading import read_text
     from tfcompose.foundation.findings import RejectedError
     from tfcompose.spec.load import load
     from tfcompose.tools.fleet.check import check_fleet
-    from tfcompose.tools.fleet.spec import validate_fleet
+    from tfcompose.tools.fleet.spec import FleetSpec, validate_fleet
 
     try:
-        source = load(read_text(file), file)
+        source = load(read_text(file), file, FleetSpec.BEGIN)
         spec = validate_fleet(source)
     except RejectedError as error:
         return None, list(error.findings)
@@ -205,7 +206,7 @@ def _row(robot: FleetRobotStatus) -> tuple[str, ...]:
 def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespace) -> int:
     """Print poses until a signal comes.
 
-    A link that is stale is named instead, once, and so is its return.
+    If a link becomes stale or live again, print this once.
     """
     from tfcompose.compiler.render.pose import pose_json, pose_text
     from tfcompose.foundation.numbers import clean
@@ -213,7 +214,7 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
     from tfcompose.tools.fleet.observe import StaleError
 
     begun = time.monotonic()
-    shown = False
+    is_printed = False
     wrong, trouble, due = "", "", 0.0
     try:
         while (now := time.monotonic()) - begun < (arguments.duration or float("inf")):
@@ -224,12 +225,12 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
                 wrong = str(error)
             except TransformException as error:
                 wrong = str(error.detail)
-            waiting = not shown and now - begun < _OBSERVE_S
+            waiting = not is_printed and now - begun < _OBSERVE_S
             if wrong != trouble and not (wrong and waiting):
                 warn(wrong or "the links are live again")
                 trouble = wrong
             if not wrong and now >= due:
-                due, shown = now + 1 / arguments.rate, True
+                due, is_printed = now + 1 / arguments.rate, True
                 age_s = None if stamp_ns is None else (time.time_ns() - stamp_ns) / 1e9
                 if arguments.format == "json":
                     sys.stdout.write(
@@ -239,10 +240,10 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
                     when = ", fixed" if age_s is None else f", {age_s:.2f} s ago"
                     sys.stdout.write(pose_text(target, source, clean(pose), when))
                 sys.stdout.flush()
-            if arguments.once and (shown or not waiting):
+            if arguments.once and (is_printed or not waiting):
                 break
             time.sleep(0.05)
     finally:
-        if not shown and wrong != trouble:  # also where it ended before it was sure
+        if not is_printed and wrong != trouble:  # also if a signal came earlier
             warn(wrong)
-    return 0 if shown else FAILED
+    return 0 if is_printed else FAILED

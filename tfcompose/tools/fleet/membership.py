@@ -1,6 +1,7 @@
 """Robot as a member of a fleet.
 
-The process that shares its edges, and whether the fleet's file fits.
+This module adds the process ``fleet_share`` to the robot, and checks that the fleet file fits the
+robot.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Source
 
-#: The process that shares a robot's edges with its fleet.
+#: The name of the process that shares a robot's edges with its fleet.
 SHARE = "fleet_share"
 _NAMED_AT_MOST = 8
 
@@ -33,7 +34,8 @@ _NAMED_AT_MOST = 8
 def share_process(section: ToolSection) -> Iterator[Process]:
     """Yield the process that shares the robot's edges.
 
-    It is ready once it is started, and its failure ends nothing: no robot needs the others to run.
+    The process is ready once it has started. If it fails, the robot keeps running, because no
+    robot needs the others.
     """
     file = find_path(section.value.file, section.span_of("file"))
     spec = section.spec
@@ -52,9 +54,9 @@ def _name(section: ToolSection) -> str:
 
 
 def _below(spec: RobotSpec) -> tuple[str, ...]:
-    """Return what says where the robot's TF topics are.
+    """Return the option for the namespace of the robot's TF topics.
 
-    Below its namespace, where they are isolated.
+    The TF topics are in the robot's namespace only if they are isolated.
     """
     namespace = spec.ros.namespace.strip("/")
     return (
@@ -63,9 +65,10 @@ def _below(spec: RobotSpec) -> tuple[str, ...]:
 
 
 def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
-    """Return what is wrong with the fleet's file for this robot.
+    """Return findings about the fleet file.
 
-    It cannot be read, or names what the robot is not.
+    The fleet file may be unreadable or wrong, may not contain this robot, or may share edges that
+    the robot does not have.
     """
     spec, member = section.spec, section.value
     span = section.span_of("file")
@@ -87,11 +90,11 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
     name = _name(section)
     if name not in fleet.robots:
         span = section.span_of("robot") if member.robot else spec.span_of(("robot",))
-        known = (
+        listed = (
             f"robots: {list_names(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
             " NAME}"
         )
-        advice = did_you_mean(name, fleet.robots, known)
+        advice = did_you_mean(name, fleet.robots, listed)
         return [finding("TF886", f"no robot {name} in {path}", span, help=advice)]
     return _unknown_edges(robot, name, fleet, fleet_source, section)
 
@@ -101,8 +104,8 @@ def _unknown_edges(
 ) -> list[Finding]:
     """Return a finding for each edge that the fleet shares and the robot does not have.
 
-    Where entries of the robot were refused, or a key stands twice, nobody knows which edges it was
-    meant to have.
+    If the robot file has errors in entries or a duplicate key, the robot's edges are not certain,
+    and the result is empty.
     """
     if robot.broken or any(finding.code == "TF003" for finding in section.spec.spans.findings):
         return []

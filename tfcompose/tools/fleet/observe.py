@@ -1,6 +1,7 @@
-"""The fleet as it is seen from anywhere.
+"""Observation of a fleet from any computer.
 
-What each robot shares, how old it is, and poses between robots.
+An observer receives the shared edges of robots. It returns the state of each robot, the age of its
+edges, and poses between robots.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Pose
     from tfcompose.tools.fleet.spec import FleetSpec
 
-#: A robot sends twice a second: where the last that came was sent longer ago, its link is stale,
-#: in seconds.
+#: The age in seconds of a robot's last message at which its link is stale. A robot sends twice a
+#: second.
 STALE_S = 2.0
-#: An edge is stale after so many periods, and never before ``STALE_S``.
+#: The number of periods after which an edge is stale, but not before ``STALE_S``.
 _PERIODS = 4.0
-#: By so much the clocks of two computers may differ, in seconds.
+#: The largest accepted difference between the clocks of two computers, in seconds.
 CLOCK_S = 0.5
 _RETRY_S = 1.0
 _LATE = (
@@ -39,47 +40,48 @@ LinkState = Literal["live", "stale", "silent", "unreachable"]
 
 
 class StaleError(Exception):
-    """Raised where a pose needs a link or an edge that is stale, or never came.
+    """Raised if a pose needs a link or an edge that is stale or was never received.
 
-    The message names the first of them.
+    The message names the first such link or edge.
     """
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeStatus:
-    """A shared edge, by its names in the fleet."""
+    """The status of a shared edge. Frames have their names in the fleet."""
 
     parent: str
     child: str
-    #: Since it was sent, in seconds; None: it never arrived.
+    #: The time since it was sent, in seconds; None if it never arrived.
     age_s: float | None
-    #: Its last arrival here minus its stamp, by the two computers' clocks, in seconds; None for a
-    #: fixed edge.
+    #: The time of its last arrival, by this computer's clock, minus its stamp, by the robot's
+    #: clock, in seconds; None for a fixed edge.
     delay_s: float | None
     stale: bool
 
 
 @dataclass(frozen=True, slots=True)
 class FleetRobotStatus:
-    """The status of a robot: whether it is reached, and what it shares.
+    """The status of a robot and of the edges that it shares.
 
-    live: it sends. stale: nothing arrived that was sent within ``STALE_S``. silent: its router is
-    reached, and it has sent nothing yet. unreachable: its router is not reached.
+    live: its last message was sent within ``STALE_S``. stale: its last message is older. silent:
+    its router is connected, but the robot has sent nothing yet. unreachable: its router is not
+    connected.
     """
 
     robot: str
     router: str
     state: LinkState
-    #: Since its last message was sent, in seconds; None: there was none.
+    #: The time since its last message was sent, in seconds; None if there was none.
     age_s: float | None
     edges: tuple[EdgeStatus, ...]
-    #: How long its last message took, by the two computers' clocks, in seconds.
+    #: The transmission time of its last message, by the two computers' clocks, in seconds.
     delay_s: float = 0.0
 
 
 @dataclass(slots=True)
 class _Link:
-    """A robot's received transforms, with send times by this monotonic clock, in s."""
+    """The received transforms of a robot, with times of sending by this computer's clock."""
 
     last: float | None = None
     delay_s: float = 0.0
@@ -90,8 +92,8 @@ class _Link:
 class FleetObserver:
     """Listens to robots of a fleet until it is closed.
 
-    ``frames`` are a target and a source: only robots with edges between them are listened to then,
-    else all of them. ``buffer`` answers lookups between them.
+    If ``frames`` contains a target and a source, the observer listens only to robots with edges
+    between these frames, else to all robots. ``buffer`` answers lookups.
     """
 
     def __init__(self, fleet: FleetSpec, frames: tuple[str, str] | None = None) -> None:
@@ -116,8 +118,9 @@ class FleetObserver:
         self._sessions: dict[str, Any] = {}
         self._subscribers: list[Any] = []
         self._ended = threading.Event()
-        # Zenoh's callbacks run in threads that are daemons where the subscriber's thread is one. A
-        # daemon that comes back from Zenoh while Python ends aborts the process.
+        # Zenoh calls back in daemon threads if the subscribing thread is a daemon. If a daemon
+        # thread returns from Zenoh while Python exits, the process aborts. Therefore these threads
+        # are not daemons.
         self._threads = [
             threading.Thread(
                 target=self._connect, args=(router,), name=f"router {router}", daemon=False
@@ -128,7 +131,10 @@ class FleetObserver:
             thread.start()
 
     def close(self) -> None:
-        """End the sessions after their subscribers, whose threads Python waits for at its exit."""
+        """Close the subscribers, then the sessions.
+
+        Python waits for the subscribers' threads when it exits.
+        """
         self._ended.set()
         for thread in self._threads:
             thread.join()
@@ -138,18 +144,18 @@ class FleetObserver:
             session.close()
 
     def wait(self, seconds: float) -> bool:
-        """Wait so long; return whether every edge of every robot has come before."""
+        """Wait until every edge of every robot has arrived; return False after a timeout."""
         end = time.monotonic() + seconds
         while not (complete := self.is_complete()) and (left := end - time.monotonic()) > 0:
             self._ended.wait(min(0.05, left))
         return complete
 
     def is_complete(self) -> bool:
-        """Return whether every edge of every robot has come."""
+        """Return whether every edge of every robot has arrived."""
         return all(edge.age_s is not None for robot in self.status() for edge in robot.edges)
 
     def status(self) -> list[FleetRobotStatus]:
-        """Return what is known now of each robot, in the order of the file."""
+        """Return the current status of each robot, in the order of the file."""
         now = time.monotonic()
         with self._lock:
             return [self._status(robot, now) for robot in self.fleet.robots]
@@ -158,9 +164,9 @@ class FleetObserver:
         """Return the newest pose of ``source`` in ``target`` and its stamp.
 
         Raises:
-            StaleError: if a link or an edge between the two is stale, of which the buffer still
-                has the last pose; or nothing came from a robot.
-            TransformException: if there is none.
+            StaleError: if a link or an edge between the two frames is stale, or a robot has sent
+            nothing. The buffer may still contain an old pose. TransformException: if there is no
+            transform between the frames.
         """
         needed = self._between(target, source)
         is_shared = {target, source} <= self._parents.keys() | set(self._parents.values())
@@ -179,12 +185,12 @@ class FleetObserver:
         return self.buffer.latest(target, source)
 
     def findings(self) -> Iterator[Finding]:
-        """Yield what is wrong now."""
+        """Yield findings about the current status of all robots."""
         for robot in self.status():
             yield from problems_of(robot)
 
     def _between(self, target: str, source: str) -> set[str]:
-        """Return the children of the fleet's edges that are between two frames."""
+        """Return the child frames of the shared edges between two frames."""
         chains = []
         for frame in (target, source):
             chain = [frame]
@@ -221,7 +227,7 @@ class FleetObserver:
         return "silent" if age_s is None else "stale"
 
     def _connect(self, router: str) -> None:
-        """Connect to a router once it is there, and listen to the robots on it."""
+        """Connect to a router as soon as it is available, and listen to its robots."""
         while not self._ended.is_set():
             try:
                 session = connect_router(router)
@@ -254,9 +260,7 @@ class FleetObserver:
                 if sample.timestamp is None
                 else time_s - sample.timestamp.get_time().timestamp()
             )
-            sent = now - max(
-                link.delay_s, 0.0
-            )  # what waited in a link that was cut is as old as it is
+            sent = now - max(link.delay_s, 0.0)  # delayed messages keep their times of sending
             link.last = max(sent, link.last or sent)
             for row in rows:
                 stamp_ns = row[2] * _SECOND_NS + row[3]
@@ -268,7 +272,7 @@ class FleetObserver:
 
 
 def problems_of(robot: FleetRobotStatus) -> Iterator[Finding]:
-    """Yield what is wrong with a robot."""
+    """Yield findings about the status of a robot."""
     if robot.state == "unreachable":
         ago = f"; its last message is {robot.age_s:.1f} s old" if robot.age_s is not None else ""
         advice = (

@@ -1,4 +1,4 @@
-"""Check of what sharing edges with a fleet needs."""
+"""Check before the start that eclipse-zenoh is installed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
     from tfcompose.model.plan import Plan
 
-#: The command of a process that shares edges begins with this.
+#: The beginning of the command line of a process that shares edges.
 SHARE_COMMAND = (PROGRAM, "fleet", "share")
-#: What installs what it needs.
+#: The command that installs eclipse-zenoh.
 INSTALL = "pip install 'tfcompose[fleet]'"
 
 
 def missing_zenoh(plan: Plan) -> Iterator[Finding]:
-    """Yield a finding for each process of the plan that this Python cannot share edges with."""
+    """Yield a finding for each process that needs eclipse-zenoh, if it is not installed."""
     for process in plan.managed if find_spec("zenoh") is None else ():
         if process.argv[:3] == SHARE_COMMAND:
             yield finding(

@@ -1,4 +1,4 @@
-"""The process on a robot that shares its edges; it reads TF by ROS."""
+"""Process that runs on a robot, reads its TF through ROS, and shares its edges."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 def share(
     fleet: FleetSpec, robot: str, namespace: str, stop: Stop, say: Callable[[str], None]
 ) -> None:
-    """Share a robot's edges until ``stop`` is requested; ``namespace`` is that of its TF topics.
+    """Share a robot's edges until ``stop`` is requested.
+
+    ``namespace`` is the namespace of the robot's TF topics.
 
     Raises:
         RosError: if ROS cannot start a node.

@@ -1,4 +1,4 @@
-"""Sessions of Zenoh that reach one router, over the extra ``fleet``."""
+"""Zenoh sessions with a router, from the extra ``fleet``."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Any
 
 import zenoh
 
-#: So long a router is waited for, in milliseconds.
+#: The timeout for a connection to a router, in milliseconds.
 _CONNECT_MS = 1000
 
 
 def connect_router(router: str) -> Any:
-    """Return a client's session with the router.
+    """Return a client session with a router.
 
-    It connects again by itself, and has to be closed.
+    The session reconnects by itself. The caller must close it.
 
     Raises:
-        ConnectionError: if the router is not reached within a second.
+        ConnectionError: if the router does not answer within a second.
     """
     config = zenoh.Config()
     settings = {
@@ -25,7 +25,7 @@ def connect_router(router: str) -> Any:
         "connect/endpoints": [router],
         "connect/timeout_ms": _CONNECT_MS,
         "scouting/multicast/enabled": False,
-        "timestamping/enabled": True,  # when it was sent, by the clock of who sends
+        "timestamping/enabled": True,  # the time of sending, by the sender's clock
     }
     for name, value in settings.items():
         config.insert_json5(name, json.dumps(value))

@@ -1,4 +1,4 @@
-"""Sharing of a robot's edges: from its TF topics to Zenoh, as the fleet file says."""
+"""Selection of a robot's shared edges, and their sending over Zenoh."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.tf_codec import Row
     from tfcompose.tools.fleet.spec import FleetSpec
 
-#: All fixed edges are sent so often, in seconds, also where there is none: that says that the
-#: robot is reached.
+#: The interval of the message with all fixed edges, in seconds. A robot without fixed edges sends
+#: it too, because it shows that the robot can be reached.
 BEAT_S = 0.5
 _SECOND_NS = 1_000_000_000
 
 
 class SharedEdges:
-    """Selects and renames the edges that leave a robot, one per period of their rate.
+    """Selects and renames the shared edges of a robot, one message per period of their rate.
 
-    Periods are counted from the epoch, so that robots send at the same times, and what is looked
-    up between them is of about one time.
+    The periods of all robots count from the Unix epoch. Therefore robots send at the same times,
+    and lookups between robots use poses of nearly the same time.
     """
 
     def __init__(self, fleet: FleetSpec, robot: str) -> None:
@@ -41,10 +41,10 @@ class SharedEdges:
         self._fixed: dict[tuple[str, str], SentTransform] = {}
 
     def take(self, data: bytes, *, static: bool, now_ns: int) -> bytes | None:
-        """Take a message of the robot; return what of it is to be sent now, or None.
+        """Add a message of the robot; return the message to send now, or None.
 
         Raises:
-            ValueError: if it is no TFMessage.
+            ValueError: if it is not a TFMessage.
         """
         layout, _ = self._decoder.stamps(data)
         due = [
@@ -54,19 +54,19 @@ class SharedEdges:
         ]
         if not due:
             return None
-        found = {
+        rows = {
             edge: row
             for row in self._rename_rows(self._decoder.rows(data), due)
             for edge in [(row.parent, row.child)]
         }
         if static:
-            self._fixed |= found
+            self._fixed |= rows
             return None
         self._period_of |= {edge: now_ns // self._periods_ns[edge] for edge in due}
-        return encode(list(found.values()))
+        return encode(list(rows.values()))
 
     def fixed_message(self) -> bytes:
-        """Return all fixed edges that came until now, as one message."""
+        """Return all fixed edges that have arrived, as a single message."""
         return encode(list(self._fixed.values()))
 
     def _is_due(self, edge: tuple[str, str], now_ns: int) -> bool:
@@ -86,9 +86,9 @@ class SharedEdges:
 
 
 class EdgeSender:
-    """Sends a robot's edges to its router, whenever that is reached.
+    """Sends a robot's edges to its router.
 
-    What comes meanwhile is dropped.
+    While there is no connection to the router, it drops messages.
     """
 
     def __init__(self, fleet: FleetSpec, robot: str, say: Callable[[str], None]) -> None:
@@ -102,7 +102,7 @@ class EdgeSender:
         self._malformed = False
 
     def on_message(self, data: bytes, static: bool) -> None:  # noqa: FBT001 (as the listener calls)
-        """Take a message of the robot's, from any thread."""
+        """Add a message of the robot; any thread may call this."""
         with self._lock:
             try:
                 sent = self.edges.take(data, static=static, now_ns=time.time_ns())
@@ -115,7 +115,7 @@ class EdgeSender:
             self._put("tf", sent)
 
     def beat(self) -> None:
-        """Connect where there is no session yet, and send the fixed edges."""
+        """Connect if there is no session yet, and send the fixed edges."""
         if self._session is None:
             try:
                 self._session = connect_router(self._router)
@@ -137,5 +137,5 @@ class EdgeSender:
 
     def _put(self, topic: str, data: bytes) -> None:
         if self._session is not None:
-            with suppress(Exception):  # the session connects again by itself
+            with suppress(Exception):  # the session reconnects by itself
                 self._session.put(f"{self._key}/{topic}", data)

@@ -1,6 +1,6 @@
 """Language of ``fleet.yaml``, version 1.
 
-Robots, their Zenoh routers, and which edges leave them.
+A fleet file contains robots, their Zenoh routers, and the edges that they share.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _ARROW = re.compile(r"\s*(?:→|->)\s*")
 
-#: A robot's name, which becomes part of keys and of frames.
+#: The name of a robot. It is a part of Zenoh keys and frame names.
 RobotName = Annotated[
     Text,
     Matches(r"[A-Za-z][A-Za-z0-9_-]*", "a robot's name: a letter, then letters, digits, _ and -"),
@@ -43,17 +43,17 @@ class SharedEdge(Spec):
 
     @property
     def ends(self) -> tuple[str, str]:
-        """The parent and the child, by their names on the robot."""
+        """The parent and the child, with their names on the robot."""
         parent, child = _ARROW.split(self.edge.strip())
         return parent, child
 
 
 def _by_name(value: Any) -> Any:
-    """Return ``parent → child at 5 Hz`` as the mapping that it abbreviates."""
+    """Expand ``parent → child at 5 Hz`` to a mapping."""
     if not isinstance(value, str):
         return value
-    edge, at, rate = value.partition(" at ")
-    return {"edge": edge.strip(), "rate": rate.strip()} if at else {"edge": edge}
+    edge, separator, rate = value.partition(" at ")
+    return {"edge": edge.strip(), "rate": rate.strip()} if separator else {"edge": edge}
 
 
 Shared = Annotated[SharedEdge, BeforeValidator(_by_name, Text | SharedEdge)]
@@ -95,7 +95,8 @@ class FleetRobot(Spec):
 class FleetSpec(Spec):
     """A fleet of robots."""
 
-    HABITS: ClassVar[dict[str, str]] = {"tfcompose": "a fleet file begins with fleet: 1"}
+    BEGIN: ClassVar[str] = "a fleet file begins with fleet: 1"
+    HABITS: ClassVar[dict[str, str]] = {"tfcompose": BEGIN}
 
     fleet: Literal[1] = key(..., "the version of this language", 1)
     name: Name = key("fleet", "the name; fleets with different names are separate", "warehouse")
@@ -112,14 +113,14 @@ class FleetSpec(Spec):
     )
 
     def edges_of(self, robot: str) -> tuple[SharedEdge, ...]:
-        """Return the edges that leave a robot."""
-        own = self.robots[robot].share
-        return self.share if own is None else own
+        """Return the edges that a robot shares."""
+        share = self.robots[robot].share
+        return self.share if share is None else share
 
     def final(self, robot: str, frame: str) -> str:
-        """Return the name that a robot's frame has for others."""
-        own = self.robots[robot].prefix
-        prefix = f"{robot}/" if own is None else own
+        """Return the name of a robot's frame in the fleet."""
+        robot_prefix = self.robots[robot].prefix
+        prefix = f"{robot}/" if robot_prefix is None else robot_prefix
         return (
             frame
             if frame in self.shared_frames or frame.startswith(prefix)
@@ -127,17 +128,17 @@ class FleetSpec(Spec):
         )
 
     def key_of(self, robot: str) -> str:
-        """Return where on Zenoh a robot's edges are.
+        """Return the Zenoh key of a robot.
 
-        This key, with ``/tf`` or ``/tf_static`` behind it.
+        The key for its edges ends with ``/tf`` or ``/tf_static``.
         """
         return f"tfcompose/fleet/{self.name}/{robot}"
 
 
 def validate_fleet(source: Source) -> FleetSpec:
-    """Return the typed fleet.
+    """Return the validated fleet.
 
     Raises:
-        RejectedError: with every finding, if anything is wrong with it.
+        RejectedError: with all findings, if the file has errors.
     """
     return validate_file(FleetSpec, source)

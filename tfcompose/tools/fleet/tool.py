@@ -1,4 +1,4 @@
-"""Fleet tool: poses between several robots, over Zenoh."""
+"""The tool ``fleet``: poses between robots, over Zenoh."""
 
 from tfcompose.foundation.tool import Command, Key, Language, Tool, Topic
 

@@ -1,9 +1,10 @@
-"""Import of descriptions and launch files: the text of a robot file.
+"""Import of URDF, launch files, scripts and running robots as robot files.
 
-For a URDF, ``sensors`` recognises presets, ``omitted`` lists what a robot file cannot hold, and
-``robot_file`` writes the text. Readers of launch files and scripts (``launch``, ``shell``) fill a
-``draft`` with the entries that ``programs`` makes. Launch files are read in a separate process
-(``launch_process``): by ROS's launch, whose actions ``launch_recorder`` records, and those of ROS
-1 by ``launch_ros1``. Both give the same records. A text with parts that are known only at build
-time is a ``texts.Text``.
+For a URDF, ``sensors`` recognises presets, ``unsupported`` lists the parts that a robot file
+cannot express, and ``robot_file`` writes the text. The readers of launch files and scripts,
+``launch`` and ``shell``, add entries to a ``draft``; ``executables`` makes these entries.
+
+A separate process, ``launch_process``, reads launch files. For ROS 2, it runs ROS's own launch,
+and ``launch_recorder`` records the actions. For ROS 1, it runs ``launch_ros1``. Both write the
+same records. A ``texts.Text`` is a text with parts that are known only when the robot is built.
 """

@@ -1,9 +1,9 @@
 """Write a robot file for a robot that keeps its launch files.
 
-Every process in it is external: `guard FILE`, or <tfcompose_guard file="…"/> in a launch file,
-watches the tree and starts nothing. With --status, list each fixed edge that tfcompose could
-publish instead, with the line of the launch file to remove and the line of the robot file to
-write. The tree is the same after each of these edits.
+Every process in this robot file is external. Start `guard FILE`, or <tfcompose_guard file="…"/> in
+a launch file, to watch the tree; the guard starts no process. With --status, list each fixed edge
+that tfcompose could publish instead of its node. For each edge, print the line of the launch file
+to remove and the line of the robot file to write. The tree is the same after each of these steps.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import ImportDraft
 
 _LAUNCH_ENDINGS = (".py", ".xml", ".launch", ".yaml", ".yml")
-#: Keys of a started process that an external process keeps.
+#: Keys of a process that stay when the process becomes external.
 _KEPT = ("node", "namespace")
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments: those of ``import``, and --status."""
+    """Add the arguments of ``import``, and --status."""
     command.arguments(parser)
     parser.add_argument(
         "--status",
@@ -39,7 +39,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Adopt, or print what can be handed over; exit code as for ``import``."""
+    """Write the robot file or print the status; return the same exit codes as ``import``."""
     from tfcompose.foundation.findings import RejectedError
 
     try:
@@ -59,7 +59,7 @@ def _draft_of_launch_file(arguments: Namespace) -> ImportDraft:
     """Return a draft of a launch file in which every process is external.
 
     Raises:
-        SystemExit: after saying that it is no launch file.
+        SystemExit: after printing that the file is not a launch file.
     """
     from tfcompose.tools.importers.draft import ImportDraft, robot_name
 
@@ -84,7 +84,7 @@ def _draft_of_launch_file(arguments: Namespace) -> ImportDraft:
 
 
 def _print_status(arguments: Namespace) -> int:
-    """Print each fixed edge of an external owner, with the edits that hand it over."""
+    """Print each fixed edge of an external owner, and the edits after which tfcompose owns it."""
     from tfcompose.cli.compiling import disk, library
     from tfcompose.cli.reading import read_text
     from tfcompose.compiler.compile import compile_robot
@@ -110,17 +110,18 @@ def _print_status(arguments: Namespace) -> int:
 
 
 def _status(robot: Robot, source: Source, publishers: Mapping[str, Span | None]) -> Iterator[str]:
-    """Yield the edits of each step, then the edges that have to stay with their nodes."""
+    """Yield the edits of each step, then the edges that must stay with their nodes."""
     stays = []
     for process in robot.processes:
         if process.kind != "external":
             continue
         edges = [edge for edge in robot.edges if edge.owner == process.name]
-        steps, others = _steps(edges, source, publishers)
-        kept = steps.pop(_TOGETHER, []) if others else []
+        steps, remaining = _steps(edges, source, publishers)
+        kept = steps.pop(_TOGETHER, []) if remaining else []
         if kept:
             stays.append(
-                f"{_names(kept)}: stays with {process.node}, which also publishes {_names(others)}"
+                f"{_names(kept)}: stays with {process.node}, which also publishes"
+                f" {_names(remaining)}"
             )
         for (_, name), step in steps.items():
             yield from _edits(step, source, publishers.get(name), process.node)
@@ -129,31 +130,32 @@ def _status(robot: Robot, source: Source, publishers: Mapping[str, Span | None])
     yield from stays
 
 
-#: The step of the edges that can only be handed over with all others of their node.
+#: The step for edges that tfcompose can only take over together, with all edges of their node.
 _TOGETHER = ("", "")
 
 
 def _steps(
     edges: Sequence[Edge], source: Source, publishers: Mapping[str, Span | None]
 ) -> tuple[dict[tuple[str, str], list[Edge]], list[Edge]]:
-    """Return the edges of a process by the step that hands them over, and its other edges.
+    """Return the edges of a process by step, and its other edges.
 
-    A part is a step, and so is a fixed edge that has a publisher of its own in the launch file.
+    In each step, tfcompose takes over some edges. A part is a step. A fixed edge with a separate
+    publisher in the launch file is also a step.
     """
     steps: dict[tuple[str, str], list[Edge]] = {}
-    others = []
+    remaining = []
     for edge in edges:
         section, name = map(str, edge.entry[:2])
         if source.mapping(section, name).get("owner") != edge.owner:
-            others.append(edge)  # of a driver, inside of its sensor
+            remaining.append(edge)  # an edge inside a sensor, published by the driver
         elif section == "parts":
             steps.setdefault((section, name), []).append(edge)
         elif edge.kind == "static":
             step = (section, edge.child) if edge.child in publishers else _TOGETHER
             steps.setdefault(step, []).append(edge)
         else:
-            others.append(edge)
-    return steps, others
+            remaining.append(edge)
+    return steps, remaining
 
 
 def _names(edges: Sequence[Edge]) -> str:
@@ -163,7 +165,7 @@ def _names(edges: Sequence[Edge]) -> str:
 def _edits(
     edges: Sequence[Edge], source: Source, started: Span | None, node: str
 ) -> Iterator[str]:
-    """Yield what the edges are, and the edits of the launch file and of their entries."""
+    """Yield the names of the edges, and the edits in the launch file and the robot file."""
     from tfcompose.foundation.yaml_text import flow
 
     entries = list(dict.fromkeys(edge.entry[:2] for edge in edges))
@@ -177,22 +179,25 @@ def _edits(
     for section, name in entries:
         keys: dict[str, Any] = dict(source.mapping(section, name))
         kept = {key: value for key, value in keys.items() if key not in {"owner", "static"}}
-        at, end = source.key_span((section, name)), _last_line(source, (section, name), keys)
-        lines = f", to line {end}" if end > at.line else ""
-        yield f"  write   {at}{lines}: {name}: {flow(kept)}"
+        span, end = source.key_span((section, name)), _last_line(source, (section, name), keys)
+        lines = f", to line {end}" if end > span.line else ""
+        yield f"  write   {span}{lines}: {name}: {flow(kept)}"
 
 
 def _last_line(source: Source, path: tuple[str | int, ...], value: Any) -> int:
-    """Return the line in which a value ends: the span of a block mapping ends at the next key."""
+    """Return the last line of a value.
+
+    The span of a block mapping cannot be used, because it ends at the next key.
+    """
     items = value.items() if isinstance(value, dict) else ()
     lines = [_last_line(source, (*path, key), item) for key, item in items]
     return max(lines, default=source.span_of(path).end_line)
 
 
 def _removal(process: str, source: Source) -> Iterator[str]:
-    """Yield the removal of a process without edges."""
-    at = source.key_span(("processes", process))
-    yield f"  remove  {at}: {process}, which owns no other edge"
+    """Yield the edit that removes a process without edges."""
+    span = source.key_span(("processes", process))
+    yield f"  remove  {span}: {process}, which owns no other edge"
     if len(source.mapping("processes")) == 1:
         emptied = source.key_span(("processes",))
         yield f"  remove  {emptied}: processes, which is empty then"

@@ -1,10 +1,11 @@
 """Write a robot file from URDF, launch files, scripts or a running robot.
 
 Write a robot file from URDF, xacro, launch files, shell scripts, Clearpath's robot.yaml,
-Autoware's calibrations, a running tree or a recording. Building a robot from a URDF gives the
-same URDF; frames that match a preset become sensors. Launch files and scripts become processes
-and frames. A tree becomes frames with their owners. Anything that a robot file cannot express
-becomes a TODO comment with its file and line, and a finding.
+Autoware's calibrations, a running tree or a recording. From a URDF, write links, joints and
+frames, and a sensor for frames that match a preset; building the robot file gives the same URDF.
+From launch files and scripts, write processes and frames. From a tree, write frames with their
+owners. For anything that a robot file cannot express, write a TODO comment with its file and line,
+and report a finding.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
+    """Add the arguments of ``import``."""
     parser.add_argument(
         "file",
         nargs="?",
@@ -105,10 +106,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Import; exit code 0, 1 with errors in the source, 2 after wrong use.
-
-    Also 2 for what cannot be read.
-    """
+    """Import; exit code 0, 1 for errors in the source, 2 for wrong use or an unreadable source."""
     from tfcompose.cli.reading import quote
     from tfcompose.foundation.findings import RejectedError
 
@@ -131,17 +129,17 @@ def _import_urdf(arguments: Namespace) -> int:
 
     _refuse_more(arguments)
     packages = pairs(arguments.packages, "=")
-    known = _known_packages(packages, arguments)
-    document = read_urdf(arguments.file, known, arguments.arg_values)
+    folders = _known_packages(packages, arguments)
+    document = read_urdf(arguments.file, folders, arguments.arg_values)
     errors = [finding for finding in document.findings() if finding.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
         fail("nothing was written; --keep-going writes as much as possible")
-    text, more_errors = _robot_file(document, arguments, known.local | packages)
+    text, more_errors = _robot_file(document, arguments, folders.local | packages)
     if more_errors and not arguments.keep_going:
         print_findings(
             [replace(finding, span=None) for finding in more_errors], sys.stderr
-        )  # places in what is not written
+        )  # their spans are in a file that is not written
         fail(
             "nothing was written: a robot file cannot express all of the source; --keep-going"
             " writes it anyway"
@@ -151,9 +149,9 @@ def _import_urdf(arguments: Namespace) -> int:
 
 
 def _import_bringup(arguments: Namespace) -> int:
-    """Import what starts processes.
+    """Import launch files and scripts.
 
-    Everything that is understood is written, and the rest is named.
+    Write all parts that can be translated, and name all others.
     """
     from tempfile import TemporaryDirectory
 
@@ -163,8 +161,8 @@ def _import_bringup(arguments: Namespace) -> int:
     from tfcompose.tools.importers.shell import add_script
 
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
-    wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
-    draft = ImportDraft(wanted, [f"imported from {name} by tfcompose"])
+    robot = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
+    draft = ImportDraft(robot, [f"imported from {name} by tfcompose"])
     if is_folder(arguments.file):
         _add_vehicles(draft, arguments)
     elif kit := _kit(arguments.file):
@@ -172,15 +170,15 @@ def _import_bringup(arguments: Namespace) -> int:
     elif arguments.file.endswith(_LAUNCH):
         add_launch_file(draft, arguments, arguments.file)
     elif arguments.file == STDIN and (ending := _ending_of(text := _with_root(read_text(STDIN)))):
-        with TemporaryDirectory() as folder:  # nothing else is there to be read
+        with TemporaryDirectory() as folder:  # contains no other file to read
             file = Path(folder, f"stdin{ending}")
             file.write_text(text, encoding="utf-8")
             add_launch_file(draft, arguments, str(file), "<stdin>")
     else:
         _refuse_more(arguments)
         _refuse_given(arguments)
-        shown = arguments.file if arguments.file != STDIN else "<stdin>"
-        add_script(draft, read_text(arguments.file), shown, _target(arguments))
+        source_name = arguments.file if arguments.file != STDIN else "<stdin>"
+        add_script(draft, read_text(arguments.file), source_name, _target(arguments))
     return finish(draft, arguments)
 
 
@@ -201,7 +199,7 @@ def _refuse_given(arguments: Namespace) -> None:
 
 
 def _kit(file: str) -> Source | None:
-    """Return a YAML file that is no launch file, or None."""
+    """Return the file if it is YAML but not a launch file, or None."""
     from tfcompose.cli.reading import read_text
     from tfcompose.spec.load import load
 
@@ -282,9 +280,9 @@ def observed_draft(arguments: Namespace, *, is_adopted: bool = False) -> ImportD
 
 
 def _with_root(text: str) -> str:
-    """Return lines of a launch file in XML as one.
+    """Return the text as an XML launch file.
 
-    From its first line on, elements without ``<launch>`` around.
+    If the text contains only elements, add ``<launch>`` around them, without moving a line.
     """
     return (
         f"<launch>{text}</launch>"
@@ -294,7 +292,7 @@ def _with_root(text: str) -> str:
 
 
 def _ending_of(text: str) -> str:
-    """Return the ending that a launch file has with this text, empty where it is none."""
+    """Return the file ending of a launch file with this text; empty if it is not a launch file."""
     if "def generate_launch_description" in text:
         return ".py"
     return (
@@ -306,18 +304,18 @@ def _ending_of(text: str) -> str:
     )
 
 
-def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: str = "") -> None:
+def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, name: str = "") -> None:
     """Add the processes of a launch file, and the descriptions of its state publishers."""
     from tfcompose.cli.compiling import library, print_output, report_missing_confinement
     from tfcompose.cli.reading import read_text
     from tfcompose.tools.importers.launch import add_launch
     from tfcompose.tools.importers.launch_answer import Launch
-    from tfcompose.tools.importers.urdf import Workshop, add_descriptions
+    from tfcompose.tools.importers.urdf import ImportContext, add_descriptions
 
     _refuse_more(arguments)
     packages = pairs(arguments.packages, "=")
-    known, target = _known_packages(packages, arguments), _target(arguments)
-    prefixes = known.disk.prefixes if known.disk else ()
+    package_folders, target = _known_packages(packages, arguments), _target(arguments)
+    prefixes = package_folders.disk.prefixes if package_folders.disk else ()
     launch = Launch(
         file,
         read_text(file),
@@ -325,7 +323,7 @@ def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: 
         packages,
         prefixes=prefixes,
         every_branch=arguments.all_branches,
-        shown=shown,
+        display_name=name,
         is_trusted=arguments.trust,
         print_output=print_output,
         report_missing=report_missing_confinement,
@@ -333,7 +331,7 @@ def add_launch_file(draft: ImportDraft, arguments: Namespace, file: str, shown: 
     folders = {name: str(Path(folder).absolute()) for name, folder in packages.items()}
     descriptions = add_launch(draft, launch, target)
     presets = None if arguments.no_sensors else library()
-    add_descriptions(draft, descriptions, Workshop(known, target, presets, folders))
+    add_descriptions(draft, descriptions, ImportContext(package_folders, target, presets, folders))
 
 
 def finish(draft: ImportDraft, arguments: Namespace) -> int:
@@ -365,7 +363,7 @@ def finish(draft: ImportDraft, arguments: Namespace) -> int:
 
 
 def _write_neighbours(files: dict[str, str], arguments: Namespace) -> None:
-    """Write the files that the robot file names and the source makes, where it is written too."""
+    """Write files of the launch file that the robot file names next to the robot file."""
     from tfcompose.foundation.findings import finding
     from tfcompose.foundation.reading import exists
 
@@ -379,13 +377,13 @@ def _write_neighbours(files: dict[str, str], arguments: Namespace) -> None:
         if exists(path) and not arguments.force:
             fail(f"{path} exists already; --force overwrites it", UNREADABLE)
     for path, text in files.items():
-        with suppress(OSError):  # writing below says so
+        with suppress(OSError):  # the write below reports the error
             Path(path).parent.mkdir(exist_ok=True)
         _write(text, path)
 
 
 def _disk(packages: Iterable[str], arguments: Namespace) -> Disk:
-    """Return the readable files here: the source's for xacro, and these packages."""
+    """Return the files that xacro may read: files of the source and of these packages."""
     from tfcompose.cli.compiling import disk
 
     sources = [arguments.file] if arguments.file else []
@@ -407,7 +405,7 @@ def check_use(arguments: Namespace) -> None:
     """Refuse invalid names, and an output file that exists.
 
     Raises:
-        SystemExit: after saying so.
+        SystemExit: after printing the reason.
     """
     if bool(arguments.file) + arguments.live + bool(arguments.bag) != 1:
         fail("name one source: a file, --live or --bag", UNREADABLE)
@@ -458,7 +456,7 @@ def _lint(text: str, arguments: Namespace) -> Compiled:
 def _robot_file(
     document: Document, arguments: Namespace, packages: dict[str, str]
 ) -> tuple[str, list[Finding]]:
-    """Return the robot file, and the errors that it has where the source has none."""
+    """Return the robot file, and errors in it that are not errors of the source."""
     from tfcompose.cli.compiling import library
     from tfcompose.tools.importers.robot_file import import_document, with_findings
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.program import Program
     from tfcompose.tools.importers.static_transforms import Reader
 
-#: Words that stand before a program and leave it what it is.
+#: Commands that run the program in their arguments without changing its meaning.
 BEFORE = frozenset({"exec", "nohup", "time", "stdbuf", "setsid"})
 
 
@@ -33,15 +33,16 @@ def with_ros_arguments(program: Program) -> Program:
     return _without_ros_arguments(program) if program.package is not None else program
 
 
-#: Characters that mean more to a shell than a part of a word.
+#: Characters that have a special meaning for a shell.
 _OF_SHELLS = re.compile(r"[$`|&;<>(){}*?~#\[\]!\n]|^\s*\w+=")
 
 
 def _without_shell(program: Program) -> Program:
-    """Return what a shell would start, where it does nothing but split the text into words.
+    """Return the program that a shell command starts.
 
-    The arguments of a package's program are split so too, and what more a shell does with them is
-    left out with a word.
+    This is possible only if the shell does no more than split the text into words. The arguments
+    of a package's program are also split. Arguments that need more from a shell are left out and
+    noted.
     """
     text = concatenate(program.argv, " ")
     is_known = all(isinstance(part, str) for part in parts_of(text))
@@ -63,7 +64,7 @@ def _without_shell(program: Program) -> Program:
 
 
 def _of_command(program: Program) -> Program:
-    """Return the package's program that a command starts, if it starts one."""
+    """Return the package's program that a command starts, or the program itself."""
     argv = list(program.argv)
     while argv and argv[0] in BEFORE:
         argv.pop(0)
@@ -86,12 +87,12 @@ def _of_command(program: Program) -> Program:
 
 
 def _without_ros_arguments(program: Program) -> Program:
-    """Return the program with what ``--ros-args`` says as its keys.
+    """Return the program with the ROS arguments of its command line as keys.
 
-    What has no key stays an argument. They stand before what launch itself says: of two rules the
-    first one counts, of two values the last one.
+    ROS arguments without a key stay arguments. The keys come before the values that launch sets:
+    of two remapping rules the first counts, of two parameter values the last.
     """
-    own: list[str] = []
+    arguments: list[str] = []
     kept: list[str] = []
     params: list[Mapping[str, Any] | str] = []
     remap: list[tuple[str, str]] = []
@@ -103,7 +104,7 @@ def _without_ros_arguments(program: Program) -> Program:
         if not inside or argument in {"--ros-args", "--"}:
             inside = argument == "--ros-args" if argument in {"--ros-args", "--"} else inside
             if not inside and argument != "--ros-args":
-                own.append(argument)
+                arguments.append(argument)
             continue
         value = next(own_argv, "") if argument in _WITH_VALUE else ""
         left, _, right = partition(value, ":=")
@@ -120,7 +121,7 @@ def _without_ros_arguments(program: Program) -> Program:
             keys["log_level"] = value
         else:
             kept += [argument, value] if value else [argument]
-    argv = (*own, "--ros-args", *kept) if kept else tuple(own)
+    argv = (*arguments, "--ros-args", *kept) if kept else tuple(arguments)
     before = len(params)
     return replace(
         program,
@@ -134,7 +135,7 @@ def _without_ros_arguments(program: Program) -> Program:
     )
 
 
-#: The rules that give a node its name and namespace.
+#: Remapping rules that set the name and the namespace of a node.
 _NAMES = {"__node": "name", "__name": "name", "__ns": "namespace"}
 _WITH_VALUE = frozenset(
     {"-r", "--remap", "-p", "--param", "--params-file", "--log-level", "-e", "--enclave"}
@@ -143,7 +144,7 @@ _LEVELS = frozenset({"debug", "info", "warn", "error", "fatal"})
 
 
 def _yaml_value(text: str) -> Any:
-    """Return a parameter of the command line, which ROS reads as one of a parameter file."""
+    """Return the value of a command-line parameter, which ROS parses as YAML."""
     if isinstance(text, Text):
         return text
     try:

@@ -1,6 +1,7 @@
-"""A robot file in the making: sections with entries, comments, and omissions.
+"""Draft of a robot file: sections with entries, comments, and findings about omissions.
 
-Readers of launch files, scripts and running robots fill it in source order. It writes the text.
+The readers of launch files, scripts and running robots add entries to the draft, in the order of
+the source. The draft then writes the text of the robot file.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 #: A section and the name of an entry in it; both are empty for the file itself.
 Entry = tuple[str, str]
 
-#: In the order of the language.
+#: The sections of a robot file, in the order in which it lists them.
 SECTIONS = (
     "args",
     "ros",
@@ -45,9 +46,11 @@ SECTIONS = (
     "processes",
     "rules",
 )
-#: A quaternion whose length is this close to 1 is kept as it is in the source.
+#: If a quaternion's length differs from 1 by at most this, the robot file contains the source's
+#: numbers.
 _UNIT = 1e-7
-#: Errors of a robot file that are warnings where its source is so, and why.
+#: Errors that a draft takes over from its source. ``text_with_findings`` makes each a warning,
+#: with this reason as a comment.
 _OF_SOURCE = {
     "TF335": "the clocks are those of the source, whose nodes do not agree",
     "TF501": "the names are those of the source",
@@ -57,14 +60,14 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 
 @dataclass(slots=True)
 class ImportDraft:
-    """A robot file in the making."""
+    """A robot file that readers fill and that then writes its text."""
 
     robot: str
     #: Comments at the top of the file.
     head: list[str] = field(default_factory=list)
-    #: The robot's base if it is not the default.
+    #: The robot's base frame, if it is not the default.
     base: str | None = None
-    #: Plain data, as in a robot file.
+    #: The entries by section and name, as plain data.
     sections: dict[str, dict[str, Any]] = field(
         default_factory=lambda: {name: {} for name in SECTIONS}
     )
@@ -72,35 +75,37 @@ class ImportDraft:
     notes: dict[Entry, list[str]] = field(default_factory=dict)
     #: Omitted parts of the source. Each finding is also a comment.
     findings: list[Finding] = field(default_factory=list)
-    #: Frames that sensors add. They are no roots.
+    #: Frames that sensors bring. They need no entry under ``frames``.
     brought: set[str] = field(default_factory=set)
     #: Whether parts add frames whose names are unknown here.
     has_unknown_frames: bool = False
-    #: The files that the source may read; by default all files that a user names.
+    #: The files that the import may read. The default is all files.
     reach: Reach = field(default_factory=lambda: Reach(everything=True))
-    #: Texts of files that the source writes when it starts, by their placeholder paths.
+    #: Texts of files that the source would write when it starts, by placeholder path. This
+    #: is the path of the file, or that of its source file with ``#`` and a number.
     made: dict[str, str] = field(default_factory=dict)
-    #: Texts of those files that the robot file names, by their paths from its folder.
+    #: Texts of the files that the import writes next to the robot file, by their paths from the
+    #: robot file's folder.
     neighbours: dict[str, str] = field(default_factory=dict)
-    #: The placeholder paths of files in ``neighbours``.
+    #: The placeholder paths of the files that ``bring`` copied from ``made`` to ``neighbours``.
     used: set[str] = field(default_factory=set)
-    #: Each process with its use_sim_time, None where the source does not set it, and its place.
+    #: Each process with its use_sim_time (None if the source does not set it) and its location.
     clocks: list[tuple[str, Any, Span | None]] = field(default_factory=list)
-    #: Whether the robot keeps its launch files: each process is external.
+    #: Whether the robot keeps its launch files, so that each process is external.
     is_adopted: bool = False
-    #: Locations in a launch file that start publishers: of a fixed edge, by its child, and of a
-    #: part.
+    #: Locations in the launch file at which publishers start, by the child frame of their fixed
+    #: edge or by the name of their part.
     publishers: dict[str, Span | None] = field(default_factory=dict)
 
     def note(self, path: Entry, *texts: str) -> None:
-        """Put comments above an entry, each once."""
-        known = self.notes.setdefault(path, [])
-        known += [text for text in texts if text not in known]
+        """Add comments above an entry, without repeating a comment."""
+        notes = self.notes.setdefault(path, [])
+        notes += [text for text in texts if text not in notes]
 
     def todo(
         self, message: str, span: Span | None, path: Entry = ("", ""), advice: str = ""
     ) -> None:
-        """Record something that is not imported, as a comment and as a finding."""
+        """Report a part of the source that is not imported, as a comment and a finding."""
         where = f"{posixpath.basename(span.file)}:{span.line}: " if span and span.file else ""
         self.note(path, f"TODO {where}{message}")
         noted = finding("TF020", message, span, help=advice)
@@ -112,9 +117,9 @@ class ImportDraft:
     ) -> bool:
         """Add a fixed frame unless its name is taken; return whether it was added."""
         frames = self.sections["frames"]
-        known = frames.get(child)
-        if known is not None:
-            same = known == {"parent": parent, **keys}
+        entry = frames.get(child)
+        if entry is not None:
+            same = entry == {"parent": parent, **keys}
             more = "" if same else f"; {_describe(parent, keys)} here"
             self.todo(f"{child} is published a second time{more}", span, ("frames", child))
             return False
@@ -123,7 +128,10 @@ class ImportDraft:
         return True
 
     def bring(self, path: str) -> str:
-        """Put a file that the source writes next to the robot file; return its path from there."""
+        """Copy a file from ``made`` to ``neighbours``, in the folder ``ROBOT_params``.
+
+        ``path`` is its placeholder path. Return its path from the robot file's folder.
+        """
         self.used.add(path)
         base, ending = posixpath.splitext(posixpath.basename(path.rpartition("#")[0] or path))
         for number in itertools.count(1):
@@ -133,10 +141,10 @@ class ImportDraft:
         raise AssertionError
 
     def process(
-        self, wanted: str, keys: Mapping[str, Any], *notes: str, section: str = "processes"
+        self, preferred: str, keys: Mapping[str, Any], *notes: str, section: str = "processes"
     ) -> str:
         """Add a process or a container under a free name, and return the name."""
-        name = self.free_name(wanted)
+        name = self.free_name(preferred)
         self.sections[section][name] = dict(keys)
         self.note((section, name), *notes)
         return name
@@ -149,12 +157,12 @@ class ImportDraft:
         """Return the containers and processes by name."""
         return {**self.sections["containers"], **self.sections["processes"]}
 
-    def free_name(self, wanted: str) -> str:
-        """Return a name for a process or sensor, made of letters, digits and _.
+    def free_name(self, preferred: str) -> str:
+        """Return an unused name for a process or sensor, made of letters, digits and _.
 
-        A number makes it unique.
+        If the preferred name is used, a number is appended.
         """
-        plain = _NO_NAME.sub("_", wanted).strip("_") or "process"
+        plain = _NO_NAME.sub("_", preferred).strip("_") or "process"
         plain = plain if plain[0].isalpha() else f"process_{plain}"
         names_in_use = {
             *self.sections["processes"],
@@ -188,19 +196,22 @@ class ImportDraft:
             lines += section(
                 title, entries, {name: self.notes.get((title, name), ()) for name in entries}
             )
-        homeless = [
+        unplaced = [
             f"{name}: {text}"
             for (title, name), texts in self.notes.items()
             if title and name not in sections.get(title, {})
             for text in texts
         ]
-        return "\n".join([*lines, *comment(homeless), ""])
+        return "\n".join([*lines, *comment(unplaced), ""])
 
     def _with_roots(self) -> dict[str, dict[str, Any]]:
-        """Return the sections, with frames that are only parents added as roots."""
+        """Return the sections, with a root frame for each parent that no entry describes.
+
+        If parts add unknown frames, add none, because those frames can be the parents.
+        """
         frames = self.sections["frames"]
-        known = {*frames, *self.sections["links"], *self.brought}
-        known |= {joint["child"] for joint in self.sections["joints"].values()}
+        names = {*frames, *self.sections["links"], *self.brought}
+        names |= {joint["child"] for joint in self.sections["joints"].values()}
         if self.has_unknown_frames:
             return self.sections
         roots: dict[str, Any] = {}
@@ -210,15 +221,16 @@ class ImportDraft:
             *self.sections["sensors"].values(),
         ]:
             for key in ("parent", "relative_to"):
-                if isinstance(parent := keys.get(key), str) and parent not in known:
+                if isinstance(parent := keys.get(key), str) and parent not in names:
                     roots.setdefault(parent, {})
         return {**self.sections, "frames": {**roots, **frames}}
 
 
 def path_from(target: Target, path: str) -> str:
-    """Return a path in the form of a robot file.
+    """Return the form in which the robot file at ``target`` names the file or folder ``path``.
 
-    Relative to its folder, or absolute if they share only the root.
+    This is ``path`` relative to the robot file's folder. If ``path`` and that folder have only
+    the root folder ``/`` in common, it is the absolute path.
     """
     begin = posixpath.normpath(posixpath.join(target.top, target.folder))
     is_near = posixpath.commonpath([begin, posixpath.join(target.top, path)]) != "/"
@@ -230,7 +242,7 @@ def path_from(target: Target, path: str) -> str:
 
 
 def where(span: Span | None, what: str = "") -> str:
-    """Return the place of a value in the form of a comment."""
+    """Return a comment with the location of a value in the source."""
     place = f"{posixpath.basename(span.file)}:{span.line}" if span and span.file else ""
     return ": ".join(part for part in (place, what) if part)
 
@@ -242,10 +254,11 @@ def _describe(parent: str, keys: Mapping[str, Any]) -> str:
 def pose_keys(
     pose: Pose, rpy: Vector | None = None, *, quaternion: bool = False
 ) -> dict[str, Any]:
-    """Return the keys of a pose, nothing for the identity.
+    """Return the keys of a pose; empty for the identity.
 
-    ``rpy`` (rad) are the source's angles. With ``quaternion`` the source has a quaternion, which
-    is kept unless it clearly means whole degrees.
+    ``rpy`` are the source's angles, in radians. With ``quaternion``, the source has a quaternion.
+    The result then contains it, unless each angle is a number of degrees with few decimals: then
+    the result contains the angles.
     """
     keys: dict[str, Any] = {"xyz": [value + 0.0 for value in pose.xyz]} if any(pose.xyz) else {}
     if rpy is not None:
@@ -262,9 +275,9 @@ def pose_keys(
     return keys | {"rpy": turned}
 
 
-def robot_name(wanted: str) -> str:
-    """Return a robot's name: lower case letters, digits and _, a letter first."""
-    name = re.sub(r"[^a-z0-9_]+", "_", wanted.lower()).strip("_")
+def robot_name(text: str) -> str:
+    """Return the text as a robot's name, with lower case letters, digits and _."""
+    name = re.sub(r"[^a-z0-9_]+", "_", text.lower()).strip("_")
     if not name:
         return "robot"
     return name if name[0].isalpha() else f"robot_{name}"
@@ -275,8 +288,8 @@ def text_with_findings(
 ) -> tuple[str, Compiled]:
     """Return the robot file, and lint's findings about it.
 
-    Names and clocks from the source are not errors. A source without frames gives a robot with
-    one.
+    First complete the draft: if it has no frames, add the frame ``base_link``; if lint reports
+    errors of ``_OF_SOURCE``, add rules that make them warnings.
     """
     if not any(
         draft.sections[title] for title in ("links", "joints", "frames", "sensors", "parts")

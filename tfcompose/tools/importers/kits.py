@@ -1,8 +1,8 @@
 """Clearpath's ``robot.yaml`` and Autoware's calibration files, as drafts of robot files.
 
 Clearpath's generator calls a xacro macro of its packages for the platform and for each attachment,
-mount, sensor and manipulator (source: clearpath_common and clearpath_config). The parts here do
-the same, under the same names.
+mount, sensor and manipulator (source: clearpath_common and clearpath_config). The imported robot
+file has a part for each of these calls, with the same macro and the same name.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import ImportDraft
 
 _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Clearpath's mounts that are in a separate folder.
+#: Clearpath's mounts whose macros are in a separate folder.
 _PACS = frozenset({"bracket", "riser"})
-#: File that all macros need: the generated robot includes it.
+#: A file that all macros need. The robot of Clearpath's generator also includes it.
 _COMMON = "package://clearpath_platform_description/urdf/common.urdf.xacro"
-#: Keys of an entry that go into the macro's call, not its parameters.
+#: Keys of an entry that are not parameters of the macro.
 _OF_CALL = frozenset({"parent", "xyz", "rpy", "name", "type", "enabled", "urdf_enabled"})
 _LINKS = ("box", "cylinder", "frame", "mesh", "sphere")
-#: Mount of everything that names no parent.
+#: The parent of all entries that name no parent.
 _MOUNT = "default_mount"
-#: Default attachments by platform and type. The generator writes all of them.
+#: Default attachments, by platform and type. The generator writes all of them.
 _ATTACHMENTS: dict[str, dict[str, Any]] = {
     "a200.bumper": {"parent": "front_bumper_mount", "extension": 0.0},
     "a200.sensor_arch": {"model": "sensor_arch_300"},
@@ -51,7 +51,8 @@ _ATTACHMENTS: dict[str, dict[str, Any]] = {
     "r100.hams": {"table_height": 0.6, "mount_height": 0.3},
     "r100.tower": {"left_height": 0.0, "right_height": 0.0},
 }
-#: The joint by which an arm of Kinova's knows its gripper, behind the gripper's name.
+#: The joint of a gripper that an arm of Kinova needs as a parameter: its suffix after the name of
+#: the gripper, by the gripper's model.
 _GRIPPER_JOINTS = {
     "kinova_2f_lite": "_right_finger_bottom_joint",
     "robotiq_2f_140": "_finger_joint",
@@ -71,7 +72,7 @@ def is_clearpath(source: Source) -> bool:
 def is_autoware(source: Source) -> bool:
     """Return whether the data is a calibration of Autoware.
 
-    It has frames below their parents, each with x, y, z and angles.
+    Such a file maps parents to child frames, each with x, y, z and angles.
     """
     return bool(source.data) and all(
         isinstance(children, dict)
@@ -111,7 +112,8 @@ def add_autoware(draft: ImportDraft, source: Source) -> None:
                 draft.todo(f"{child}: {', '.join(left)}", span, ("frames", str(child)))
 
 
-#: In a package of individual parameters: config/VEHICLE/KIT/….
+#: Names of calibration files. In a package of individual parameters, they are in
+#: config/VEHICLE/KIT.
 _CALIBRATIONS = ("sensors_calibration.yaml", "sensor_kit_calibration.yaml")
 
 
@@ -122,23 +124,24 @@ def add_vehicles(
     selection: Mapping[str, str],
     read: Callable[[str], Source],
 ) -> None:
-    """Add calibrations of Autoware's individual parameters, a folder per vehicle.
+    """Add the calibrations from a package of Autoware's individual parameters.
 
-    The folder of a kit's description has only the kit's own. If there are several vehicles, the
-    vehicle becomes an argument of the robot file. ``given`` may set ``vehicle_id`` and
-    ``sensor_model``, as in Autoware's launch files.
+    The package has a folder for each vehicle. The folder of a kit's description contains only the
+    calibrations of the kit. If there are several vehicles, the vehicle becomes an argument of the
+    robot file. ``selection`` may contain ``vehicle_id`` and ``sensor_model``, as in Autoware's
+    launch files.
 
     Raises:
-        RejectedError: if the folder holds no calibrations, or it is not said of which kit they are
-            to be.
+        RejectedError: if the folder contains no calibrations, or contains several kits and
+        ``selection`` names none.
     """
     config = folder / "config" if is_folder(folder / "config") else folder
-    own = sorted(
+    folders = sorted(
         (config / name for name in names_in(config) if name.endswith("_calibration.yaml")),
         key=lambda file: (file.name != _CALIBRATIONS[0], file.name),
     )
-    if own:  # the description of one kit, whose calibrations are those of no vehicle
-        for file in own:
+    if folders:  # the description of a kit, without vehicles
+        for file in folders:
             add_kit(draft, read(str(file)))
         return
     kits: dict[str, list[str]] = {}
@@ -178,7 +181,7 @@ def add_vehicles(
 
 
 def _folders_of_kits(config: Path) -> Iterator[Path]:
-    """Yield the folders of kits in those of vehicles."""
+    """Yield the kit folders inside the vehicle folders."""
     for vehicle in filter(is_folder, (config / name for name in names_in(config))):
         yield from (vehicle / name for name in names_in(vehicle))
 
@@ -190,47 +193,47 @@ def _quote(text: str) -> str:
 def _calibrated_edges(
     draft: ImportDraft, sources: Mapping[str, Source]
 ) -> dict[tuple[str, str], list[str]]:
-    """Return the edges of calibrations, each with the vehicles that have it."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """Return the edges in the calibrations, each with the vehicles that have it."""
+    edges: dict[tuple[str, str], list[str]] = {}
     for vehicle, source in sources.items():
         if not is_autoware(source):
             draft.todo("no calibration of Autoware's", Span(source.file))
             continue
         for parent, children in source.data.items():
             for child in children:
-                found.setdefault((str(parent), str(child)), []).append(vehicle)
-    return found
+                edges.setdefault((str(parent), str(child)), []).append(vehicle)
+    return edges
 
 
 def _one_of(
-    known: Collection[str], selection: Mapping[str, str], argument: str, folder: str, what: str
+    choices: Collection[str], selection: Mapping[str, str], argument: str, folder: str, what: str
 ) -> str:
-    """Return the name that is given, or the only one.
+    """Return the selected name, or the only name.
 
     Raises:
-        RejectedError: if there are none, or several and none is given.
+        RejectedError: if there is no name, or if there are several and none is selected.
     """
-    wanted = selection.get(argument, next(iter(known)) if len(known) == 1 else "")
-    if wanted in known:
-        return wanted
-    if not known:
+    choice = selection.get(argument, next(iter(choices)) if len(choices) == 1 else "")
+    if choice in choices:
+        return choice
+    if not choices:
         message = f"no {' or '.join(_CALIBRATIONS)} below config/VEHICLE/KIT"
         raise RejectedError([finding("TF002", message, Span(folder))])
     message = (
-        f"there is no {what} {wanted}" if wanted else f"more than one {what}: {', '.join(known)}"
+        f"there is no {what} {choice}" if choice else f"more than one {what}: {', '.join(choices)}"
     )
     raise RejectedError(
-        [finding("TF002", message, Span(folder), help=f"{argument}:={'|'.join(known)}")]
+        [finding("TF002", message, Span(folder), help=f"{argument}:={'|'.join(choices)}")]
     )
 
 
 def _words(value: Any) -> Any:
-    """Return a macro's parameter: of a list its words, as URDF has them."""
+    """Return the value of a macro's parameter; a list becomes words separated by spaces."""
     return " ".join(map(str, value)) if isinstance(value, list) else value
 
 
 class _Clearpath:
-    """Reads one robot.yaml."""
+    """Adds the contents of a robot.yaml to a draft."""
 
     def __init__(self, draft: ImportDraft, source: Source) -> None:
         self.draft, self.source, self.data = draft, source, source.data
@@ -256,7 +259,7 @@ class _Clearpath:
                 self._sensor(f"{kind}_{index}", entry, path)
         for kind in self._kinds("manipulators"):
             self._manipulators(kind)
-        known = {
+        sections = {
             "serial_number",
             "version",
             "system",
@@ -266,18 +269,20 @@ class _Clearpath:
             "sensors",
             "manipulators",
         }
-        for key in self.data.keys() - known:
+        for key in self.data.keys() - sections:
             self.draft.todo(f"{key} is not imported", self.source.key_span((key,)))
 
     def _kinds(self, section: str) -> list[str]:
-        found = self.data.get(section)
+        listed = self.data.get(section)
         return (
-            [kind for kind, entries in found.items() if entries] if isinstance(found, dict) else []
+            [kind for kind, entries in listed.items() if entries]
+            if isinstance(listed, dict)
+            else []
         )
 
     def _entries(self, section: str, kind: str) -> list[tuple[int, Steps, dict[str, Any]]]:
-        found = self.data.get(section)
-        entries = found.get(kind) if isinstance(found, dict) else None
+        section_data = self.data.get(section)
+        entries = section_data.get(kind) if isinstance(section_data, dict) else None
         listed = entries if isinstance(entries, list) else []
         return [
             (i, (section, kind, i), entry)
@@ -353,27 +358,27 @@ class _Clearpath:
         return f"package://clearpath_platform_description/urdf/{file}"
 
     def _link(self, name: str, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
-        """Return a link's entry with its mesh as an address.
+        """Return the entry of a link with its mesh as an address.
 
-        What its macro does not take is named.
+        Note each key that is not a parameter of the link's macro.
         """
-        own = dict(entry)
-        mesh = own.get("visual")
+        settings = dict(entry)
+        mesh = settings.get("visual")
         if isinstance(mesh, dict):
             package, file = mesh.get("package"), str(mesh.get("path", ""))
-            own["visual"] = (
+            settings["visual"] = (
                 f"package://{package}/{file.lstrip('/')}" if package else f"file://{file}"
             )
-        for key in own.keys() & {"offset_xyz", "offset_rpy"}:
+        for key in settings.keys() & {"offset_xyz", "offset_rpy"}:
             self.draft.todo(
                 f"{name}: {key}, which Clearpath's macros do not take",
                 self.source.key_span((*path, key)),
             )
-            del own[key]
-        return own
+            del settings[key]
+        return settings
 
     def _part(self, name: str, file: str, macro: str, entry: dict[str, Any], path: Steps) -> None:
-        """Add what the generator calls a macro for."""
+        """Add a part for an entry for which the generator calls a macro."""
         span = self.source.span_of(path)
         params: dict[str, Any] = {"name": name, "parent_link": entry.get("parent", _MOUNT)}
         origin = self._origin(entry, path)
@@ -382,7 +387,7 @@ class _Clearpath:
         include = [_COMMON]
         if (
             path[0] in {"sensors", "manipulators"} and self.platform
-        ):  # which take the arguments of the platform's file
+        ):  # these macros use arguments of the platform's file
             include.append(self._of_platform())
         keys: dict[str, Any] = {
             "xacro": f"package://{file}",
@@ -433,26 +438,26 @@ class _Clearpath:
             self.draft.todo(message, span, ("parts", name), advice)
 
     def _camera(self, model: str, entry: dict[str, Any]) -> dict[str, Any]:
-        """Return the parameter that selects a camera of a family, if frames depend on it."""
+        """Return the parameter that selects a camera model, if the frames depend on the model."""
         if model != "stereolabs_zed":
             return {}
         node = (entry.get("ros_parameters") or {}).get(model)
-        known = (
+        camera_model = (
             node.get("general.camera_model") or (node.get("general") or {}).get("camera_model")
             if node
             else None
         )
-        return {"model": known or "zed2"}
+        return {"model": camera_model or "zed2"}
 
     def _arm(self, name: str, model: str, entry: dict[str, Any]) -> dict[str, Any]:
         """Return the parameters of an arm's macro."""
-        own = {
+        settings = {
             key: value
             for key, value in entry.items()
             if key not in {"model", "ros_parameters", "gripper", "ip"}
         }
         if "ip" in entry:
-            own["robot_ip" if model.startswith("kinova") else "ip"] = entry["ip"]
+            settings["robot_ip" if model.startswith("kinova") else "ip"] = entry["ip"]
         gripper = entry.get("gripper")
         joint = (
             _GRIPPER_JOINTS.get(str(gripper.get("model", "")))
@@ -460,22 +465,22 @@ class _Clearpath:
             else None
         )
         if joint and model.startswith("kinova"):
-            own |= {
+            settings |= {
                 "use_internal_bus_gripper_comm": True,
                 "gripper_joint_name": f"{name}_gripper{joint}",
             }
-        return own
+        return settings
 
     def _manipulators(self, kind: str) -> None:
         for index, path, entry in self._entries("manipulators", kind):
             model, type_ = str(entry.get("model", "")), kind.removesuffix("s")
             name = f"{type_}_{index}"
-            own = self._arm(name, model, entry)
+            settings = self._arm(name, model, entry)
             self._part(
                 name,
                 f"clearpath_manipulators_description/urdf/{type_}/{model}.urdf.xacro",
                 model,
-                own,
+                settings,
                 path,
             )
             gripper = entry.get("gripper")
@@ -492,7 +497,7 @@ class _Clearpath:
 
 
 def add_clearpath(draft: ImportDraft, source: Source) -> None:
-    """Add the robot that Clearpath's generator would describe."""
+    """Add the robot of a Clearpath robot.yaml."""
     draft.has_unknown_frames = True
     _Clearpath(draft, source).add()
 
@@ -501,7 +506,7 @@ def add_kit(draft: ImportDraft, source: Source) -> None:
     """Add a YAML file of Clearpath or Autoware.
 
     Raises:
-        RejectedError: if it is neither.
+        RejectedError: if the file is neither.
     """
     if is_clearpath(source):
         add_clearpath(draft, source)

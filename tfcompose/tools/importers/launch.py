@@ -1,6 +1,7 @@
-"""Launch files as a draft of a robot file.
+"""Import of launch files into the draft of a robot file.
 
-They are read in a separate process and translated into the language's keys.
+A separate process reads a launch file and returns records. This module turns the records into
+entries of the robot file.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from tfcompose.model.process_keys import (
 )
 from tfcompose.model.robot import value_of_word
 from tfcompose.tools.importers.draft import path_from, where
+from tfcompose.tools.importers.executables import add_program
 from tfcompose.tools.importers.launch_answer import Launch, answer_of, has_launch, reach_of
 from tfcompose.tools.importers.launch_records import PACKAGE, relative, scalar_of
 from tfcompose.tools.importers.launch_ros1 import has_only_transforms, is_of_ros1
@@ -36,7 +38,6 @@ from tfcompose.tools.importers.program import (
     Description,
     Program,
 )
-from tfcompose.tools.importers.programs import add_program
 from tfcompose.tools.importers.robot_settings import (
     SEVERAL,
     is_isolated,
@@ -61,14 +62,14 @@ if TYPE_CHECKING:
     from tfcompose.model.files import Target
     from tfcompose.tools.importers.draft import ImportDraft
 
-#: Programs whose arguments are read: they have their values.
+#: Programs whose arguments become values in the robot file.
 _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
 _INSTALL = (
     "source a distribution's setup file, such as /opt/ros/jazzy/setup.bash: launch comes with it"
     " (apt install ros-jazzy-ros-base), and not with pip"
 )
-#: The programs that are components, too, by their classes.
+#: Programs that also exist as components, by class.
 _PUBLISHERS = {
     STATIC_PLUGIN: PROGRAM,
     "robot_state_publisher::RobotStatePublisher": STATE_PUBLISHER,
@@ -78,11 +79,11 @@ _PUBLISHERS = {
 def add_launch(draft: ImportDraft, launch: Launch, target: Target) -> list[Description]:
     """Add the processes of a launch file to the draft.
 
-    Return the descriptions given to its robot_state_publishers.
+    Return the descriptions of its robot_state_publishers.
 
     Raises:
-        RejectedError: if it is no launch file, takes too long or too much memory, or needs ROS's
-            launch, which is not installed.
+        RejectedError: if the file is not a launch file, takes too much time or memory, or needs
+        ROS's launch and this is not installed.
     """
     draft.reach = reach_of(launch)
     of_ros1 = is_of_ros1(launch.text, launch.file)
@@ -110,7 +111,7 @@ def add_launch(draft: ImportDraft, launch: Launch, target: Target) -> list[Descr
 
 
 class _LaunchImport:
-    """Turns records into entries."""
+    """Turns the records of a launch file into entries of the draft."""
 
     def __init__(
         self, draft: ImportDraft, launch: Launch, target: Target, records: list[dict[str, Any]]
@@ -122,7 +123,7 @@ class _LaunchImport:
         self._delays: list[tuple[str, float]] = []
         self._missing: dict[str, Span] = {}
         self._saved: dict[str, Span] = {}
-        #: Containers of components: the ids of actions, or the full names of nodes.
+        #: The containers of components, by the id of their action or the full name of their node.
         self._loading = {
             record["container"] for record in records if record["kind"] == "component"
         }
@@ -130,11 +131,11 @@ class _LaunchImport:
         self._components: list[tuple[str, str, Span]] = []
         self._only_when = ""
         self._arguments: dict[str, tuple[dict[str, Any], Span]] = {}
-        #: Those whose values are in frames.
+        #: Arguments whose values are in frames.
         self._read: set[str] = set()
 
     def add(self, record: dict[str, Any]) -> None:
-        """Add one record."""
+        """Add the entries for a record."""
         span = self._span(record["at"])
         kind = record["kind"]
         adders: dict[str, Callable[[dict[str, Any], Span], None]] = {
@@ -161,23 +162,23 @@ class _LaunchImport:
             self.draft.todo(record["text"], span)
 
     def finish(self, decided: list[str]) -> None:
-        """Add what depends on all records.
+        """Add the entries that depend on all records.
 
-        ``decided`` are arguments whose values are fixed in the added entries.
+        ``decided`` are the arguments whose values are fixed in the entries.
         """
         one_clock(self.draft)
         self._args({*decided, *self._read})
         self._into_containers()
         started = self.draft.started_entries()
         for name, after in self._after:
-            own = started[name].get("container")
-            known = {
+            container = started[name].get("container")
+            conditions = {
                 self._names[key]: what
                 for key, what in after.items()
-                if self._names.get(key, own) != own
+                if self._names.get(key, container) != container
             }
-            if known:
-                started[name].setdefault("after", {}).update(known)
+            if conditions:
+                started[name].setdefault("after", {}).update(conditions)
         self._delay()
         one_namespace(self.draft)
         for package, span in self._missing.items():
@@ -186,11 +187,11 @@ class _LaunchImport:
             if file not in self.draft.used:
                 self.draft.todo(f"open for writing {file}: not done", span)
 
-    def _span(self, at: Any) -> Span:
-        file, line = (at[0], at[1]) if at else ("", 1)
+    def _span(self, place: Any) -> Span:
+        file, line = (place[0], place[1]) if place else ("", 1)
         absolute = str(Path(self.launch.file).absolute())
         if file not in {absolute, ""} and not self.draft.reach.allows(file):
-            return self.launch.span()  # findings show the lines of their places
+            return self.launch.span()  # the finding shows the lines of this location
         return (
             self.launch.span(line)
             if file in {absolute, ""}
@@ -201,7 +202,7 @@ class _LaunchImport:
         self._arguments[record["name"]] = (record, span)
 
     def _args(self, decided: set[str]) -> None:
-        """Add the arguments that entries name, and say of the others which values they had."""
+        """Add the arguments that entries use, and note the values of all other arguments."""
         used = arguments_in(self.draft.sections) | self._in_expressions()
         unread = {
             name: span
@@ -284,7 +285,7 @@ class _LaunchImport:
             self._containers[str(record["id"])] = self._containers[_full_name(program)] = name
 
     def _keep_started(self, record: dict[str, Any], name: str) -> None:
-        """Keep of what was added when it is started."""
+        """Store the conditions, the predecessors and the delay of an added process."""
         self._names[str(record.get("id"))] = name
         self._conditions(record, self.draft.entry_of(name))
         if record.get("after"):
@@ -295,7 +296,7 @@ class _LaunchImport:
     def _component(self, record: dict[str, Any], span: Span) -> None:
         """Add a node that a container loads.
 
-        That of a stock publisher's class is what its program is.
+        If its class is a stock publisher, import it like the publisher's program.
         """
         plugin = record["plugin"]
         if plugin in _PUBLISHERS:
@@ -312,23 +313,23 @@ class _LaunchImport:
         self._components.append((name, record["container"], span))
 
     def _into_containers(self) -> None:
-        """Let components name their containers.
+        """Set the container of each component.
 
-        One that the launch file does not start runs already.
+        A container that the launch file does not start becomes an external container.
         """
-        for name, wanted, span in self._components:
-            if wanted not in self._containers:
-                namespace, _, node = wanted.strip("/").rpartition("/")
+        for name, container, span in self._components:
+            if container not in self._containers:
+                namespace, _, node = container.strip("/").rpartition("/")
                 free = self.draft.free_name(node)
                 keys: dict[str, Any] = {"external": True} | (
                     {"node": node} if node != free else {}
                 )
                 keys |= {"namespace": namespace} if namespace else {}
                 note = where(span, "the source does not start this container: it starts elsewhere")
-                self._containers[wanted] = self.draft.process(
+                self._containers[container] = self.draft.process(
                     free, keys, note, section="containers"
                 )
-            self.draft.sections["processes"][name]["container"] = self._containers[wanted]
+            self.draft.sections["processes"][name]["container"] = self._containers[container]
 
     def _conditions(self, record: dict[str, Any], path: tuple[str, str]) -> None:
         for text in record.get("when", ()):
@@ -354,7 +355,7 @@ class _LaunchImport:
         if record.get("ros1"):
             description = (
                 description if record["executable"] == STATE_PUBLISHER else None
-            )  # it is one of all nodes'
+            )  # a parameter of all nodes
             reader = "tf" if record["package"] == "tf" else "tf2_ros"
         return Program(
             span,
@@ -378,9 +379,9 @@ class _LaunchImport:
         )
 
     def _is_container(self, record: dict[str, Any]) -> bool:
-        """Return whether a node loads components.
+        """Return whether a node is a container.
 
-        By its program, or because some are loaded into it.
+        It is if its program is a container, or if an action loads components into it.
         """
         if record["kind"] != "node":
             return False
@@ -390,7 +391,7 @@ class _LaunchImport:
         return is_stock or bool({str(record["id"]), named} & self._loading)
 
     def _env(self, record: dict[str, Any]) -> dict[str, str]:
-        """Return the process's variables, but for those that are settings of all."""
+        """Return the process's environment variables, without settings of the whole robot."""
         return {
             name: value
             for name, value in record.get("env", {}).items()
@@ -410,7 +411,7 @@ class _LaunchImport:
         return keys
 
     def _in_language(self, value: Any) -> Any:
-        """Return a key's value as a robot file has it."""
+        """Return a value in the form that it has in a robot file."""
         if isinstance(value, dict):
             return {name: self._in_language(item) for name, item in value.items()}
         if isinstance(value, Folder):
@@ -444,24 +445,24 @@ class _LaunchImport:
         )
         if "use_sim_time" in params:
             self.draft.clocks.append((STATE_PUBLISHER, params["use_sim_time"], span))
-        own = {
+        kept = {
             key: params[key] for key in ("publish_frequency", "ignore_timestamp") if key in params
         }
-        if own and not self.draft.is_adopted:
-            joints.setdefault("params", {}).update(own)
+        if kept and not self.draft.is_adopted:
+            joints.setdefault("params", {}).update(kept)
             self.draft.note(
                 ("processes", "joints"), where(span, "what robot_state_publisher is told")
             )
         if not joints:
             del self.draft.sections["processes"]["joints"]
-        known = {
+        handled = {
             "use_sim_time",
             "publish_frequency",
             "ignore_timestamp",
             "frame_prefix",
             "use_tf_static",
         }
-        for key in params.keys() - known:
+        for key in params.keys() - handled:
             self.draft.todo(f"robot_state_publisher: the parameter {key}", span)
         space = (program.namespace or "").strip("/")
         if space and ros.setdefault("namespace", space) != space:
@@ -474,7 +475,7 @@ class _LaunchImport:
             self.draft.todo(message, span)
 
     def _include(self, record: dict[str, Any], span: Span) -> None:
-        """Add a launch file of a package that is not found as one process."""
+        """Add a process for an included launch file whose package is not found."""
         package, _, file = record["file"].removeprefix(PACKAGE).partition("/")
         keys: dict[str, Any] = {"run": {"launch": f"{package}/{file.removeprefix('launch/')}"}}
         todo: list[str] = []
@@ -516,7 +517,7 @@ class _LaunchImport:
             self.draft.started_entries()[name]["required"] = True
 
     def _delay(self) -> None:
-        """Let what a timer starts wait: for a process that counts as ready after that time."""
+        """Let processes in a timer wait for a process that is ready after the period."""
         processes, started = self.draft.sections["processes"], self.draft.started_entries()
         gates: dict[float, str] = {}
         unfit = {name for name, _ in self._delays}
@@ -554,7 +555,7 @@ def _seconds(value: float) -> Bare:
 
 
 def _without_texts(argument: str, todo: list[str]) -> str:
-    """Return a command's word with files in place of xacro output and file texts."""
+    """Return a command's argument, with file names instead of xacro output and contents."""
     todo += [
         f"an argument is what is made of {relative(part.file)}, or its text: here it is the"
         " file's name"
@@ -564,7 +565,7 @@ def _without_texts(argument: str, todo: list[str]) -> str:
 
 
 def _exact(record: dict[str, Any]) -> range:
-    """Return which parameters launch gives under the node's full name: where it knows that."""
+    """Return the indices of the parameters that launch passes under the node's full name."""
     if record.get("name") is None or record.get("namespace") is None:
         return range(0)
     return range(record.get("common", 0), len(record["params"]))
@@ -578,7 +579,7 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
         if isinstance(param_set, str):
             kept.append(param_set)
             continue
-        own = {}
+        params_of_node = {}
         for key, value in param_set.items():
             if key == "robot_description" and isinstance(value, str):
                 description = _description(value)
@@ -587,15 +588,15 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
             elif value is None or value == [] or not _is_uniform(value):
                 todo.append(f"the parameter {key}: {value!r}")
             else:
-                own[key] = value
-        kept.append(own)
+                params_of_node[key] = value
+        kept.append(params_of_node)
     return kept, description
 
 
 def _as_in_file(value: Any) -> Any:
-    """Return parameters as rcl reads them in the file that launch writes.
+    """Return parameters as rcl reads them in the parameter file that launch writes.
 
-    Its YAML leaves 1e5 without quotes, which is a text there and a number here.
+    launch writes the text 1e5 without quotes, and rcl then reads it as a number.
     """
     if isinstance(value, dict):
         return {key: _word(item) for key, item in value.items()}

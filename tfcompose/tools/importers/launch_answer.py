@@ -1,4 +1,4 @@
-"""The confined process that reads a launch file, and the schema of its answer."""
+"""Client of the confined process that reads launch files, and the schema of its answer."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from tfcompose.tools.importers.texts import from_json
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-#: The module that reads launch files, confined.
+#: The module that runs in the confined process and reads launch files.
 PROCESS = "tfcompose.tools.importers.launch_process"
-#: Characters of why a launch file stopped.
+#: The maximum number of characters in the message of a launch file that stopped.
 _LONGEST = 4000
-#: The largest number of seconds or tries.
+#: The maximum of a time in seconds, or of a number of attempts.
 _LARGEST = 1e9
 
 
@@ -45,21 +45,21 @@ class Launch:
     #: Whether to ignore conditions.
     every_branch: bool = False
     #: The file's name in findings; empty: ``file``.
-    shown: str = ""
+    display_name: str = ""
     #: Whether to run the file without the sandbox.
     is_trusted: bool = False
     print_output: Callable[[str, str], None] = lambda _file, _text: None
     report_missing: Callable[[tuple[str, ...]], None] = lambda _: None
 
     def span(self, line: int = 1) -> Span:
-        """Return the place of one of its lines."""
-        return Span(self.shown or self.file, max(line, 1))
+        """Return the span of a line of the file."""
+        return Span(self.display_name or self.file, max(line, 1))
 
 
 def has_launch() -> bool:
     """Return whether ROS's launch can be imported.
 
-    Folders named launch are common next to launch files, and do not count.
+    A folder named launch, which is common next to launch files, does not count.
     """
     specs = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
     return all(spec is not None and spec.origin is not None for spec in specs)
@@ -79,9 +79,9 @@ def reach_of(launch: Launch) -> Reach:
 
 
 def answer_of(launch: Launch, reach: Reach, reader: str) -> dict[str, Any]:
-    """Return the records of a launch file, in order, and the remarks about it.
+    """Run the confined process, and return the records of a launch file and remarks about it.
 
-    ``reader`` is ``launch``, or ``xml`` for launch files of ROS 1.
+    ``reader`` is ``launch`` for ROS's own launch, or ``xml`` for launch files of ROS 1.
 
     Raises:
         RejectedError: if the process ends without an answer.
@@ -110,9 +110,9 @@ def answer_of(launch: Launch, reach: Reach, reader: str) -> dict[str, Any]:
             **os.environ,
             "OPENBLAS_NUM_THREADS": "1",
             "PYTHONHASHSEED": "0",
-        },  # sets keep an order
+        },  # the order of a set is the same in each run
     )
-    launch.print_output(launch.shown or launch.file, outcome.printed)
+    launch.print_output(launch.display_name or launch.file, outcome.printed)
     launch.report_missing(outcome.missing)
     answer = outcome.answer
     if fits(answer, _ANSWER) and all(map(_is_record, answer["records"])):
@@ -164,7 +164,7 @@ _NODE = (
         "ros1?": bool,
     }
 )
-#: Shape of the launch reader's answer, by kind of record.
+#: The schema of the answer, by kind of record.
 _RECORDS: dict[str, Any] = {
     "node": _NODE,
     "container": _NODE,
@@ -216,12 +216,15 @@ _PAIR = 2
 
 
 def _is_record(record: dict[str, Any]) -> bool:
-    """Return whether a record has what its kind has, whoever sent it."""
+    """Return whether a record fits the schema of its kind.
+
+    The launch file may have manipulated the process that sent it.
+    """
     counts = [record.get(keyword.name, 0) for keyword in launch_keywords("number")]
-    at = record.get("at")
+    place = record.get("at")
     return (
         fits(record, _RECORDS.get(record["kind"]))
-        and (at == [] or [type(part) for part in at or ()] == [str, int])
+        and (place == [] or [type(part) for part in place or ()] == [str, int])
         and all(len(rule) == _PAIR for rule in record.get("remap", ()))
         and abs(record.get("period", 0)) <= _LARGEST
         and all(isinstance(value, float) or abs(value) <= _LARGEST for value in counts)
@@ -229,7 +232,7 @@ def _is_record(record: dict[str, Any]) -> bool:
 
 
 def _with_texts(record: dict[str, Any]) -> dict[str, Any]:
-    """Return a record with texts in the place of what JSON has for them."""
+    """Return a record in which ``Text`` objects replace their JSON form."""
     texts: dict[str, Callable[[Any], Any]] = {
         "argv": lambda argv: list(map(from_json, argv)),
         "remap": lambda rules: [list(map(from_json, rule)) for rule in rules],
@@ -238,12 +241,12 @@ def _with_texts(record: dict[str, Any]) -> dict[str, Any]:
         "params": _params_with_texts,
         EXTRA_ARGUMENTS.name: _params_with_texts,
     }
-    found = {name: read(record[name]) for name, read in texts.items() if name in record}
-    return record | found
+    values = {name: read(record[name]) for name, read in texts.items() if name in record}
+    return record | values
 
 
 def _params_with_texts(params: list[Any]) -> list[Any]:
-    """Return parameters with texts; names of files are plain."""
+    """Return parameters in which ``Text`` objects replace their JSON form."""
     return list(map(_values_with_texts, params))
 
 
@@ -258,7 +261,7 @@ def _value_with_texts(value: Any) -> Any:
 
 
 def _describe_end(outcome: Outcome) -> str:
-    """Return how the process ended that read a launch file, without an answer."""
+    """Describe the end of a process that sent no answer."""
     if outcome.timed_out:
         return f"takes more than {confined.MOST_WALL_S:g} s"
     if outcome.refused:
@@ -271,7 +274,7 @@ def _describe_end(outcome: Outcome) -> str:
 
 
 def _describe_signal(number: int) -> str:
-    """Return what a signal says of the launch file whose process it ended."""
+    """Describe why a signal ended the process that read a launch file."""
     if number == signal.SIGXCPU:
         return "takes too long"
     if number == signal.SIGKILL:

@@ -1,4 +1,4 @@
-"""Launch's context, with the recording.
+"""A context of ROS's launch that also records what launch files start.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -20,24 +20,24 @@ from tfcompose.tools.importers.launch_records import FailedError, LaunchRecordin
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-#: Attributes of the context that are kept for later visits.
+#: Attributes that ``visit_later`` saves when it is called, and restores for the delayed visit.
 _SCOPE = ("params", "conditions", "whens", "period_s", "after", "depth")
 #: Maximum depth of launch files that include each other.
 _DEEPEST = 30
 
 
 class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[misc]
-    """Launch's context, with the recording."""
+    """A launch context that also records what launch files start."""
 
     def __init__(self, find: Callable[[str, str], str | None], *, every_branch: bool) -> None:
         launch.LaunchContext.__init__(self, noninteractive=True)
         LaunchRecording.__init__(self, find, every_branch=every_branch)
-        #: Parameters of all nodes: mappings, and names of files.
+        #: Parameters that a launch file sets for all nodes: mappings, and names of files.
         self.params: list[Any] = []
-        #: The container of the visited components: the id of its action, or the full name of its
-        #: node.
+        #: The container of the components that are being visited: the id of its action, or the
+        #: full name of its node.
         self.container: str | None = None
-        #: Visits of the actions of events and timers, after all others.
+        #: Visits of actions in event handlers and timers, which follow after all other visits.
         self.later: deque[Callable[[], None]] = deque()
         self._environment = dict(os.environ)
         self._scopes: list[tuple[list[Any], dict[str, str]]] = []
@@ -54,7 +54,7 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
 
     @property
     def variables(self) -> dict[str, str]:
-        """The variables set by launch files."""
+        """The environment variables that launch files have set or changed."""
         return {
             name: with_package(value)
             for name, value in os.environ.items()
@@ -62,15 +62,15 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
         }
 
     def is_inherited(self, name: str) -> bool:
-        """Return whether a variable has the value that the import was started with."""
+        """Return whether a variable has the value from the environment of the import."""
         return name in os.environ and self._environment.get(name) == os.environ[name]
 
     @contextlib.contextmanager
     def within(self, path: str) -> Iterator[None]:
-        """Make another launch file the one being read.
+        """Set the launch file that is being read, for a ``with`` block.
 
         Raises:
-            FailedError: if they include each other.
+            FailedError: if launch files include each other too deeply.
         """
         if self.depth >= _DEEPEST:
             raise FailedError("launch files include each other")
@@ -87,9 +87,10 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
             self._pop_locals()
 
     def visit_later(self, visit: Callable[[], None]) -> None:
-        """Let a function visit what launch visits after the launch file.
+        """Queue a function that is called after the outermost launch file has been visited.
 
-        It gets the current scope and conditions, but the later environment.
+        launch runs the actions of timers and event handlers later, too. During the call, scope
+        and conditions are as they are now. Environment variables are not restored.
         """
         configurations, names = dict(self.launch_configurations), dict(self.get_locals_as_dict())
         now = {name: copy(getattr(self, name)) for name in _SCOPE}

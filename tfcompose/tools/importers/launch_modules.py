@@ -1,9 +1,12 @@
-"""Modules that launch files import, replaced for the import.
+"""Replacements of modules that launch files import.
 
-``ament_index_python`` also finds packages around the launch file, xacro and MoveIt record which
-files they read, and nav2_common changes parameter files without a disk. Modules that are not
-installed give inert values, and are named. This runs in the process that reads launch files
-(``launch_process``), with ROS's own ``launch``.
+The replacement of ``ament_index_python`` also finds packages around the launch file. The
+replacements of xacro and MoveIt record the files that they read. The replacement of nav2_common
+changes parameter files in memory. A module that is not installed is replaced by a module whose
+objects do nothing, and the import reports its name.
+
+This module runs in the process that reads launch files (``launch_process``), with ROS's own
+``launch``.
 """
 
 from __future__ import annotations
@@ -37,11 +40,11 @@ if TYPE_CHECKING:
 
 
 def attach(context: RecordingContext) -> None:
-    """Let launch files import these modules."""
+    """Replace the modules for all later imports."""
     _find_in_index(context)
     replaced = _replaced_names(context)
     if importlib.util.find_spec("moveit_configs_utils"):
-        del replaced["moveit_configs_utils"]  # its own code knows best what it reads
+        del replaced["moveit_configs_utils"]  # if installed, its own code reads the right files
     for name in [name for name in sys.modules if name.partition(".")[0] in replaced]:
         del sys.modules[name]
     sys.meta_path.insert(0, _Replaced(replaced))
@@ -49,14 +52,17 @@ def attach(context: RecordingContext) -> None:
 
 
 def _find_in_index(context: RecordingContext) -> None:
-    """Let packages be found around the launch file too; one that is not found has an address."""
+    """Make ament_index_python also find packages around the launch file.
+
+    For a package that is not found, it returns a ``package://`` address.
+    """
 
     def share(name: str, **_more: Any) -> str:
         return context.find(name, context.file) or f"{PACKAGE}{name}"
 
     def prefix(name: str) -> str:
-        found = context.find(name, context.file)
-        return str(Path(found).parents[1]) if found else f"{PACKAGE}{name}"
+        location = context.find(name, context.file)
+        return str(Path(location).parents[1]) if location else f"{PACKAGE}{name}"
 
     index = (ament_index_python, ament_index_python.packages)
     for module in (*index, launch_ros.substitutions.find_package):
@@ -69,7 +75,7 @@ def _find_in_index(context: RecordingContext) -> None:
 
 
 def _replaced_names(context: RecordingContext) -> dict[str, dict[str, Any]]:
-    """Return what the modules of packages have that are replaced, by the packages' names."""
+    """Return the contents of the replaced modules, by the name of their package."""
 
     def share(name: str) -> str:
         return ament_index_python.packages.get_package_share_directory(name)
@@ -95,14 +101,14 @@ def _replaced_names(context: RecordingContext) -> dict[str, dict[str, Any]]:
 
 
 class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Makes modules in the place of those that are looked for."""
+    """An importer that creates replacement modules."""
 
     def exec_module(self, module: Any) -> None:
-        """Nothing has to be run."""
+        """Do nothing: the module is complete."""
 
 
 class _Replaced(_Finder):
-    """Finds the modules that are replaced, before those that are installed."""
+    """Finds replaced modules. It comes before the finders of installed modules."""
 
     def __init__(self, replaced: dict[str, dict[str, Any]]) -> None:
         self._replaced = replaced
@@ -119,7 +125,10 @@ class _Replaced(_Finder):
 
 
 class _NotInstalled(_Finder):
-    """Finds what launch files import and is not installed, after all others."""
+    """Creates modules that launch files import and that are not installed.
+
+    It comes after all other finders.
+    """
 
     def __init__(self, context: RecordingContext) -> None:
         self._context = context
@@ -146,7 +155,7 @@ def _is_from_launch_file() -> bool:
 
 
 class _Module(types.ModuleType):
-    """A module whose names are not known here, but for those that it is given."""
+    """A module that contains the given names, and creates any other name on demand."""
 
     __path__: list[str] = []  # noqa: RUF012 (as a package has it)
 
@@ -155,18 +164,18 @@ class _Module(types.ModuleType):
             raise AttributeError(name)
         qualified = f"{self.__name__}.{name}"
         if name[:1].isupper():
-            found: Any = type(name, (_Unknown,), {"NAME": qualified})
+            stand_in: Any = type(name, (_Unknown,), {"NAME": qualified})
         else:
-            found = _Unknown()
-            found.NAME = qualified
-        setattr(self, name, found)
-        return found
+            stand_in = _Unknown()
+            stand_in.NAME = qualified
+        setattr(self, name, stand_in)
+        return stand_in
 
 
 class _Unknown(launch.Action, launch.Substitution):  # type: ignore[misc]
-    """What a module that is not installed here would give: an action, a substitution, a value.
+    """An action, substitution or value from a module that is not installed.
 
-    Whatever is done with it gives the same.
+    Every operation on the object returns such an object.
     """
 
     NAME = ""
@@ -177,9 +186,9 @@ class _Unknown(launch.Action, launch.Substitution):  # type: ignore[misc]
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        found = _Unknown()
-        found.NAME = f"{self.NAME}.{name}"
-        return found
+        unknown = _Unknown()
+        unknown.NAME = f"{self.NAME}.{name}"
+        return unknown
 
     def __call__(self, *_args: Any, **_kwargs: Any) -> Any:
         return self
@@ -207,7 +216,7 @@ class _Unknown(launch.Action, launch.Substitution):  # type: ignore[misc]
 
 
 class _Document:
-    """What xacro makes of a file."""
+    """The result of xacro for a file."""
 
     def __init__(self, file: Any, mappings: Any = None) -> None:
         args = {str(name): str(value) for name, value in dict(mappings or {}).items()}

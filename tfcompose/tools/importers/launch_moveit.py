@@ -1,6 +1,7 @@
-"""MoveIt's configuration builder, which reads parameters from a configuration package.
+"""Replacement of MoveIt's configuration builder for launch files.
 
-The files and parameter names follow MoveIt's sources. Missing files are named.
+The builder reads parameters from a MoveIt configuration package. File and parameter names are
+those of MoveIt's source code. The import reports missing files.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ if TYPE_CHECKING:
 
     from tfcompose.tools.importers.launch_context import RecordingContext
 
-#: Default files of the builder's methods, and the parameter, if any, that each sets.
+#: The default file of each method of the builder, and the parameter that the method sets, if any.
 _FILES = {
     "robot_description_kinematics": ("config/kinematics.yaml", "robot_description_kinematics"),
     "joint_limits": ("config/joint_limits.yaml", "robot_description_planning"),
     "pilz_cartesian_limits": ("config/pilz_cartesian_limits.yaml", "robot_description_planning"),
     "moveit_cpp": ("config/moveit_cpp.yaml", ""),
 }
-#: Parts of MoveIt's configuration that are always there.
+#: Parts that every MoveIt configuration has.
 _USUAL = (
     "robot_description",
     "robot_description_semantic",
@@ -37,7 +38,7 @@ _USUAL = (
     "sensors_3d",
     "joint_limits",
 )
-#: Default outputs of the scene monitor by the parameters that set them, in the builder's order.
+#: Default values of the planning scene monitor's publishing parameters, in the builder's order.
 _MONITOR = {
     "publish_planning_scene": True,
     "publish_geometry_updates": True,
@@ -49,7 +50,7 @@ _MONITOR = {
 
 
 class MoveItConfigs:
-    """The built configuration: mappings of parameters."""
+    """The configuration that the builder returns: mappings of parameters."""
 
     def __init__(self, package_path: str, parts: dict[str, dict[str, Any]]) -> None:
         self.package_path, self.parts = package_path, parts
@@ -57,22 +58,22 @@ class MoveItConfigs:
     def __getattr__(self, name: str) -> dict[str, Any]:
         if name.startswith("__"):
             raise AttributeError(name)
-        found: dict[str, Any] = self.parts.get(name, {})
-        return found
+        part: dict[str, Any] = self.parts.get(name, {})
+        return part
 
     def to_dict(self) -> dict[str, Any]:
         """Return all parameters."""
         every: dict[str, Any] = {}
         for part in self.parts.values():
             for key, value in part.items():
-                known = every.get(key)
-                both = isinstance(known, dict) and isinstance(value, dict)
-                every[key] = {**known, **value} if both else value  # type: ignore[dict-item]
+                entry = every.get(key)
+                both = isinstance(entry, dict) and isinstance(value, dict)
+                every[key] = {**entry, **value} if both else value  # type: ignore[dict-item]
         return every
 
 
 class MoveItConfigsBuilder:
-    """Builds configurations; ``find`` locates packages, ``context`` collects missing files."""
+    """Builds configurations. ``find`` locates packages, and ``context`` collects missing files."""
 
     def __init__(
         self,
@@ -107,7 +108,7 @@ class MoveItConfigsBuilder:
     def robot_description(
         self, file_path: Any = None, mappings: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
-        """Take the robot's description."""
+        """Set the robot's description."""
         urdf = self._of_setup_assistant("urdf") or f"config/{self._name}.urdf.xacro"
         self._parts["robot_description"] = {self._key: self._text(file_path or urdf, mappings)}
         return self
@@ -115,7 +116,7 @@ class MoveItConfigsBuilder:
     def robot_description_semantic(
         self, file_path: Any = None, mappings: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
-        """Take the robot's semantic description (SRDF)."""
+        """Set the robot's semantic description (SRDF)."""
         srdf = self._of_setup_assistant("srdf") or f"config/{self._name}.srdf"
         self._parts["robot_description_semantic"] = {
             f"{self._key}_semantic": self._text(file_path or srdf, mappings)
@@ -123,7 +124,7 @@ class MoveItConfigsBuilder:
         return self
 
     def planning_scene_monitor(self, *args: Any, **more: Any) -> MoveItConfigsBuilder:
-        """Take the publishing settings of the planning scene monitor."""
+        """Set the publishing parameters of the planning scene monitor."""
         self._parts["planning_scene_monitor"] = {
             **_MONITOR,
             **dict(zip(_MONITOR, args, strict=False)),
@@ -134,7 +135,10 @@ class MoveItConfigsBuilder:
     def trajectory_execution(
         self, file_path: Any = None, moveit_manage_controllers: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
-        """Take the controllers; without a file, those of a file named for controllers."""
+        """Set the controllers.
+
+        Without a file, use a file of the package whose name contains controllers.
+        """
         names = [
             file.name.removesuffix("_controllers.yaml")
             for file in self._config("*_controllers.yaml")
@@ -150,9 +154,9 @@ class MoveItConfigsBuilder:
         return self
 
     def sensors_3d(self, file_path: Any = None, **_more: Any) -> MoveItConfigsBuilder:
-        """Take the sensors of the planning scene, if a file lists any."""
-        known = self._config("sensors_3d.yaml")
-        values = self._read(str(file_path or known[0])) if file_path or known else {}
+        """Set the sensors of the planning scene, if a file lists sensors."""
+        config = self._config("sensors_3d.yaml")
+        values = self._read(str(file_path or config[0])) if file_path or config else {}
         sensors = values.get("sensors")
         self._parts["sensors_3d"] = (
             values if sensors and isinstance(sensors, list) and sensors[0] else {}
@@ -160,7 +164,7 @@ class MoveItConfigsBuilder:
         return self
 
     def _config(self, pattern: str) -> list[Path]:
-        """Return the package's files of that pattern, in order."""
+        """Return the configuration files that match a pattern, in order."""
         return (
             sorted(Path(self._folder, "config").glob(pattern))
             if Path(self._folder).is_dir()
@@ -170,7 +174,7 @@ class MoveItConfigsBuilder:
     def planning_pipelines(
         self, default_planning_pipeline: Any = None, pipelines: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
-        """Take the planners; without names, those with a file in the package."""
+        """Set the planners; without names, use all planners with a file in the package."""
         names = list(pipelines or ())
         if not names:
             names = [
@@ -189,7 +193,7 @@ class MoveItConfigsBuilder:
         return self
 
     def to_moveit_configs(self) -> MoveItConfigs:
-        """Return the configuration, with MoveIt's defaults for the rest."""
+        """Return the configuration, with MoveIt's defaults for parts that were not set."""
         for name in _USUAL:
             if name not in self._parts:
                 getattr(self, name)()
@@ -203,16 +207,16 @@ class MoveItConfigsBuilder:
         return self.to_moveit_configs().to_dict()
 
     def _of_setup_assistant(self, kind: str) -> str:
-        """Return the file that MoveIt's setup assistant was given, empty where it was not used."""
+        """Return the file of a kind that the setup assistant recorded; empty if there is none."""
         file = Path(self._folder) / ".setup_assistant"
         if not file.is_file():
             return ""
         config = (yaml.safe_load(file.read_text("utf-8")) or {}).get(
             "moveit_setup_assistant_config", {}
         )
-        known = config.get(kind) or config.get(kind.upper()) or {}
-        relative = known.get("relative_path", "")
-        package = known.get("package", "")
+        section = config.get(kind) or config.get(kind.upper()) or {}
+        relative = section.get("relative_path", "")
+        package = section.get("package", "")
         return f"{self._find(package)}/{relative}" if package and relative else relative
 
     def _text(self, file: Any, mappings: Any) -> str:

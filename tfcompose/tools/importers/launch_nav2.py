@@ -1,4 +1,4 @@
-"""nav2_common's substitutions for launch files; their parameter files are not written to disk.
+"""Replacement of nav2_common's substitutions, which keeps their parameter files in memory.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -25,7 +25,7 @@ _TRUE = frozenset({"true", "1", "yes", "on", "y", "t"})
 
 
 class LaunchConfigAsBool(LaunchConfiguration):  # type: ignore[misc]
-    """An argument as True or False, in any spelling."""
+    """The value of a launch argument as True or False, for any spelling of it."""
 
     def __init__(self, name: Any) -> None:
         super().__init__(name)
@@ -36,20 +36,23 @@ class LaunchConfigAsBool(LaunchConfiguration):  # type: ignore[misc]
 
 
 class _FromFile(launch.Substitution):  # type: ignore[misc]
-    """A substitution that reads a parameter file."""
+    """Base class of substitutions that read a parameter file."""
 
     def __init__(self, source_file: Any) -> None:
         super().__init__()
         self.at, self.source_file = here(), source_file
 
     def file(self, context: RecordingContext) -> str:
-        """Return the path of the file, or its address in a package that is not found."""
+        """Return the path of the file, or a ``package://`` address if its package is not found."""
         return with_package(text_of(self.source_file, context))
 
     def write_changed(
         self, context: RecordingContext, changes: Mapping[str, str], change: Callable[[str], str]
     ) -> str:
-        """Return the path of the file with changes, which are named where it cannot be read."""
+        """Store the changed file, and return its placeholder path.
+
+        If the file's package is not found, report the changes instead.
+        """
         file = self.file(context)
         if not changes:
             return file
@@ -67,7 +70,7 @@ def _texts(values: Mapping[str, Any] | None, context: RecordingContext) -> dict[
 
 
 class ReplaceString(_FromFile):
-    """A file with texts replaced."""
+    """A copy of a file in which texts are replaced."""
 
     def __init__(
         self, source_file: Any, replacements: Mapping[str, Any], condition: Any = None
@@ -90,9 +93,9 @@ class ReplaceString(_FromFile):
 
 
 class RewrittenYaml(_FromFile):
-    """A parameter file with values and keys rewritten, or moved below a namespace.
+    """A copy of a parameter file with changed values or keys, or with an added namespace.
 
-    A rewrite is named by a key at any depth, or by the whole path with dots.
+    A rewrite applies to a key at any depth, or to a path of keys separated by dots.
     """
 
     def __init__(
@@ -126,11 +129,11 @@ class RewrittenYaml(_FromFile):
                 data[key] = self._convert(params[key])
 
     def _set_paths(self, data: Any, params: Mapping[str, str]) -> None:
-        """Set values by their paths; one that is not there is added to a node's parameters."""
-        there = set(_paths(data, ()))
+        """Set values by their paths; add a missing path to the parameters of its node."""
+        existing = set(_paths(data, ()))
         for path, value in params.items():
             keys = path.split(".")
-            if path in there or "ros__parameters" in keys:
+            if path in existing or "ros__parameters" in keys:
                 _set(data, keys, self._convert(value))
 
     def _with_values(self, data: Any, values: Mapping[str, str]) -> Any:
@@ -141,7 +144,11 @@ class RewrittenYaml(_FromFile):
         return self._convert(values[str(data)]) if str(data) in values else data
 
     def _convert(self, text: str) -> Any:
-        """Return the value of a rewrite: true or false, a number if types are converted."""
+        """Return the value of a rewrite.
+
+        The texts true and false become bools, and numbers become numbers if the launch file asks
+        for conversion.
+        """
         if self.convert_types:
             try:
                 return float(text) if "." in text else int(text)
@@ -167,7 +174,7 @@ def _with_keys(data: Any, keys: Mapping[str, str]) -> Any:
 
 
 def _paths(data: Any, above: tuple[str, ...]) -> Iterator[str]:
-    """Yield the paths of values, with dots."""
+    """Yield the paths of all values, with dots between the keys."""
     if isinstance(data, dict):
         for key, value in data.items():
             yield from _paths(value, (*above, str(key)))
@@ -179,7 +186,7 @@ def _paths(data: Any, above: tuple[str, ...]) -> Iterator[str]:
 
 
 def _set(data: Any, keys: list[str], value: Any) -> None:
-    """Set the value at a path, through items of lists; missing mappings are made."""
+    """Set the value at a path of keys and list indices; create missing mappings."""
     *above, last = keys
     for key in above:
         data = data[int(key)] if isinstance(data, list) else data.setdefault(key, {})
@@ -187,7 +194,7 @@ def _set(data: Any, keys: list[str], value: Any) -> None:
 
 
 class HasNodeParams(_FromFile):
-    """Whether a parameter file has a node."""
+    """A substitution that is True if a parameter file has a section for a node."""
 
     def __init__(self, source_file: Any, node_name: str) -> None:
         super().__init__(source_file)
@@ -200,7 +207,7 @@ class HasNodeParams(_FromFile):
 
 
 class ParseMultiRobotPose:
-    """Poses of robots, which nav2_common takes from the command line of ``ros2 launch``."""
+    """Poses of robots that nav2_common reads from the command line of ``ros2 launch``."""
 
     def __init__(self, context: RecordingContext, argument: str) -> None:
         context.todo(
@@ -209,5 +216,5 @@ class ParseMultiRobotPose:
         )
 
     def value(self) -> dict[str, Any]:
-        """Return no robots."""
+        """Return an empty mapping, because an import has no such command line."""
         return {}

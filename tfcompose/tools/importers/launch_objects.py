@@ -1,4 +1,4 @@
-"""Launch's objects, with their constructor arguments and places recorded.
+"""Recording of the constructor arguments and the locations of launch's objects.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -29,7 +29,7 @@ from tfcompose.tools.importers.launch_records import IDS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-#: As what launch runs each launch file in Python.
+#: The module name with which launch runs each Python launch file.
 _MODULE = "python_launch_file"
 _MODULES = (
     "launch.actions",
@@ -46,16 +46,16 @@ _MODULES = (
     "launch_ros.parameter_descriptions",
     "launch_ros.substitutions",
 )
-#: The lines of elements of XML and of mappings and lists of YAML, by their ids; they live as long
-#: as this process.
+#: The lines of XML elements and of YAML mappings and lists, by Python's ``id``. These objects
+#: exist until the process ends, so their ids stay valid.
 _LINES: dict[int, int] = {}
 _ALIVE: list[Any] = []
-#: The files and lines of the entities that are being parsed.
+#: A stack of the files and lines of the entities that are being parsed.
 _PLACES: list[tuple[str, int]] = []
 
 
 def attach() -> None:
-    """Make launch's objects record their arguments and their lines."""
+    """Make each new object of launch record its constructor arguments and its location."""
     for kind in _classes():
         if kind.__init__ is not object.__init__:  # type: ignore[misc]
             _keep(kind)
@@ -71,9 +71,10 @@ def attach() -> None:
 
 
 def arguments_of(made: Any) -> Mapping[str, Any]:
-    """Return an object's constructor arguments, by parameter name.
+    """Return the constructor arguments of an object, by parameter name.
 
-    For an object of a derived class, the arguments that it passes to launch's class.
+    If the object's class is derived from a class of launch, return the arguments for the class of
+    launch.
     """
     if "_made_of" not in vars(made):
         return {}
@@ -95,7 +96,7 @@ def class_name(made: Any) -> str:
 
 
 def place_of(made: Any) -> tuple[str, int]:
-    """Return the file and line that created an object."""
+    """Return the file and line at which the launch file creates an object."""
     place: tuple[str, int] = vars(made).get("_made_at", ("", 1))
     return place
 
@@ -107,7 +108,7 @@ def id_of(action: Any) -> int:
 
 
 def reason(error: BaseException) -> str:
-    """Return an exception's message on one line, with the line of the launch file."""
+    """Return an exception's message as a single line, with the line of the launch file."""
     trace, line = error.__traceback__, 0
     while trace is not None:
         if trace.tb_frame.f_globals.get("__name__") == _MODULE:
@@ -118,7 +119,7 @@ def reason(error: BaseException) -> str:
 
 
 def line_of(error: BaseException, path: str) -> int:
-    """Return the line of a file at which an exception stopped it, 0 if unknown."""
+    """Return the line at which an exception stopped a file; 0 if unknown."""
     if isinstance(error, ET.ParseError):
         return int(error.position[0])
     if mark := getattr(error, "problem_mark", None):
@@ -133,7 +134,10 @@ def line_of(error: BaseException, path: str) -> int:
 
 
 def here() -> tuple[str, int]:
-    """Return the file and line of the launch file being run or parsed, or no file."""
+    """Return the file and line of the launch file that is running or being parsed.
+
+    The file is empty if there is none.
+    """
     frame: Any = sys._getframe(1)  # noqa: SLF001 (CPython's only way)
     while frame is not None and frame.f_globals.get("__name__") != _MODULE:
         frame = frame.f_back
@@ -144,7 +148,10 @@ def here() -> tuple[str, int]:
 
 @contextlib.contextmanager
 def parsing(path: str) -> Iterator[None]:
-    """Give objects made meanwhile their places in a file that is being parsed."""
+    """Set the file that is being parsed, for a ``with`` block.
+
+    New objects get their locations in this file.
+    """
     _PLACES.append((path, 1))
     try:
         yield
@@ -153,7 +160,7 @@ def parsing(path: str) -> Iterator[None]:
 
 
 def _classes() -> Iterator[type]:
-    known = {
+    readers = {
         launch.Action: None,
         launch.Substitution: None,
         launch.Condition: None,
@@ -162,19 +169,19 @@ def _classes() -> Iterator[type]:
     for name in _MODULES:
         try:
             module = importlib.import_module(name)
-        except ImportError:  # of another version
+        except ImportError:  # this version of launch does not have it
             continue
         for kind in vars(module).values():
             if isinstance(kind, type) and kind.__module__.partition(".")[0] in {
                 "launch",
                 "launch_ros",
             }:
-                known[kind] = None
-    yield from known
+                readers[kind] = None
+    yield from readers
 
 
 def _keep(kind: type) -> None:
-    """Let the objects of a class keep what they were made of, and where."""
+    """Make new objects of a class keep their constructor arguments and their location."""
     init = kind.__init__  # type: ignore[misc]
     signature = inspect.signature(init)
 
@@ -188,26 +195,32 @@ def _keep(kind: type) -> None:
 
 
 def _with_line(parse: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a method that parses its last argument, an entity, whose line what it makes has."""
+    """Wrap a parsing method so that its result has the line of the parsed entity.
+
+    The entity is the last argument of the method.
+    """
 
     @functools.wraps(parse)
     def parsed(*args: Any) -> Any:
-        with _at(args[-1]):
+        with _located_at(args[-1]):
             return parse(*args)
 
     return parsed
 
 
 def _component_with_line(parse: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the same for components, of which parsing gives the class and what one is made of."""
+    """Wrap the parsing method of components like ``_with_line``.
+
+    This method returns the class and the constructor arguments instead of an object.
+    """
 
     @functools.wraps(parse)
     def parsed(*args: Any) -> Any:
-        with _at(args[-1]):
+        with _located_at(args[-1]):
             kind, kwargs = parse(*args)
 
         def make(**kwargs: Any) -> Any:
-            with _at(args[-1]):
+            with _located_at(args[-1]):
                 return kind(**kwargs)
 
         return make, kwargs
@@ -216,8 +229,11 @@ def _component_with_line(parse: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @contextlib.contextmanager
-def _at(entity: Any) -> Iterator[None]:
-    """Let what is made meanwhile have the line of an entity, and what is raised."""
+def _located_at(entity: Any) -> Iterator[None]:
+    """Set the entity that is being parsed, for a ``with`` block.
+
+    New objects and exceptions get the line of this entity.
+    """
     element = vars(entity).get("_Entity__xml_element", vars(entity).get("_Entity__element"))
     file, line = _PLACES[-1] if _PLACES else ("", 1)
     _PLACES.append((file, _LINES.get(id(element), line)))
@@ -239,10 +255,10 @@ def _names_of(module: Any) -> dict[str, Any]:
 
 
 def _xml_with_lines(file: Any) -> Any:
-    """Return the tree of an XML file whose elements have lines."""
+    """Return the tree of an XML file, after recording the lines of its elements."""
     text = file.read()
     root = ET.fromstring(text)  # noqa: S314 (as launch does; this process is confined)
-    with contextlib.suppress(RejectedError):  # launch reads what has no lines then
+    with contextlib.suppress(RejectedError):  # launch then reads the file without lines
         lines = _lines_of(read_xml(text, getattr(file, "name", "")))
         _LINES.update(zip(map(id, root.iter()), lines, strict=False))
     _ALIVE.append(root)
@@ -256,7 +272,7 @@ def _lines_of(element: Any) -> Iterator[int]:
 
 
 class _Loader(yaml.SafeLoader):
-    """Keeps the lines of what stands under a key."""
+    """A YAML loader that records the lines of mappings and lists."""
 
 
 def _mapping(loader: _Loader, node: Any) -> Any:
@@ -273,7 +289,7 @@ _Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
 
 
 def _yaml_with_lines(file: Any) -> Any:
-    """Return the data of a YAML file whose mappings and lists have lines."""
+    """Return the data of a YAML file, after recording the lines of its mappings and lists."""
     data = yaml.load(file, Loader=_Loader)  # noqa: S506 (it is a safe one)
     _ALIVE.append(data)
     return data

@@ -1,6 +1,7 @@
-"""Convert texts, parameters and conditions of launch, and keep launch arguments in them.
+"""Conversion of launch's texts, parameters and conditions to values of a robot file.
 
-This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
+The conversion keeps references to launch arguments where a robot file can have them. This module
+runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ from tfcompose.tools.importers.launch_records import (
     PACKAGE,
     FailedError,
     conjunction,
+    display_text,
     file_text,
     relative,
     scalar_of,
-    shown,
     with_files,
     with_package,
 )
@@ -54,10 +55,10 @@ if TYPE_CHECKING:
 
 
 def text_of(value: Any, context: RecordingContext) -> str:
-    """Return the text of a value, a substitution or a list of them, as launch evaluates it.
+    """Return the text that launch makes from a value, a substitution or a list of both.
 
     Raises:
-        FailedError: if it cannot be evaluated.
+        FailedError: if launch cannot evaluate it.
     """
     if isinstance(value, launch.Substitution):
         return str(evaluate(value.perform, context))
@@ -67,7 +68,7 @@ def text_of(value: Any, context: RecordingContext) -> str:
 
 
 def evaluate(evaluate: Callable[[Any], Any], context: RecordingContext) -> Any:
-    """Evaluate something of launch, or of another package, in a context.
+    """Call a function of launch or another package with the context, and return its result.
 
     Raises:
         FailedError: with the message of any exception.
@@ -86,9 +87,9 @@ def optional_text(value: Any, context: RecordingContext) -> str | None:
 
 
 def keep_text(value: Any, context: RecordingContext, *, typed: bool = False) -> str:
-    """Return a value's text, with launch arguments as references.
+    """Return a value's text, with references to launch arguments.
 
-    ``typed``: if an argument is the whole value it may be 10.0, which texts lose.
+    ``typed``: an argument may keep a value such as 10.0, if the argument is the whole text.
     """
     return with_package(with_files(Text.of(_parts(value, context, typed=typed))))
 
@@ -96,9 +97,9 @@ def keep_text(value: Any, context: RecordingContext, *, typed: bool = False) -> 
 def _parts(value: Any, context: RecordingContext, *, typed: bool) -> list[Part]:
     if type(value) is LaunchConfiguration:
         name = text_of(value.variable_name, context)
-        known = context.launch_configurations.get(name)
-        if isinstance(known, str) and context.argument_kept(name, known, typed=typed):
-            return [Argument(name, known)]
+        configured = context.launch_configurations.get(name)
+        if isinstance(configured, str) and context.argument_kept(name, configured, typed=typed):
+            return [Argument(name, configured)]
         return [text_of(value, context)]
     if isinstance(value, PathJoinSubstitution):
         return _join([_parts(part, context, typed=typed) for part in value.substitutions])
@@ -108,7 +109,7 @@ def _parts(value: Any, context: RecordingContext, *, typed: bool) -> list[Part]:
 
 
 def _join(paths: Iterable[list[Part]]) -> list[Part]:
-    """Return the parts of a path, as ``os.path.join`` has it."""
+    """Join the parts of paths as ``os.path.join`` does."""
     path: list[Part] = []
     for parts in paths:
         before, added = str(Text.of(path)), str(Text.of(parts))
@@ -116,15 +117,15 @@ def _join(paths: Iterable[list[Part]]) -> list[Part]:
             path = []
         elif before and not before.endswith("/"):
             path.append("/")
-        path += parts if added else []  # an empty argument is no part of it
+        path += parts if added else []  # an empty argument adds no part
     return path
 
 
 def is_true(value: Any, context: RecordingContext) -> bool:
-    """Return whether launch reads the text as true or false.
+    """Return the truth value that launch reads from a text.
 
     Raises:
-        FailedError: for another text.
+        FailedError: if launch reads the text neither as true nor as false.
     """
     if isinstance(value, bool):
         return value
@@ -137,7 +138,7 @@ def is_true(value: Any, context: RecordingContext) -> bool:
 
 
 def describe(value: Any) -> str:
-    """Return a value with its substitutions, for display."""
+    """Return a readable text for a value and its substitutions."""
     if isinstance(value, (list, tuple)):
         return " ".join(map(describe, value))
     if not isinstance(value, launch.Substitution):
@@ -165,7 +166,7 @@ def _describe_equality(arguments: Mapping[str, Any], sign: str) -> str:
     return f"{left} {sign} {right}"
 
 
-#: Display texts of substitutions by class.
+#: Functions that return a readable text for a substitution, by class name.
 _DESCRIBED: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "TextSubstitution": lambda arguments: str(arguments["text"]),
     "LaunchConfiguration": lambda arguments: describe(arguments["variable_name"]),
@@ -189,45 +190,48 @@ _DESCRIBED: dict[str, Callable[[Mapping[str, Any]], str]] = {
 _KINDS: dict[Any, str] = {bool: "bool", int: "int", float: "float", str: "string"}
 
 
-def parameters_of(declared: Any, context: RecordingContext, at: Any) -> list[Any]:
+def parameters_of(declared: Any, context: RecordingContext, place: Any) -> list[Any]:
     """Return parameters as mappings and names of files, in order.
 
-    Values that cannot be resolved are reported.
+    Report values that cannot be resolved.
     """
     read: list[Any] = []
     for params in declared or ():
         try:
             if isinstance(params, Mapping):
-                read.append(dict(_flat(params, context, "", at)))
+                read.append(dict(_flat(params, context, "", place)))
             elif isinstance(params, Parameter):
                 made_of = arguments_of(params)
                 read.append({text_of(made_of["name"], context): _describe(made_of, context)})
             else:
-                read.append(_parameter_file(params, context, at))
+                read.append(_parameter_file(params, context, place))
         except FailedError as error:
-            context.todo(at, f"parameters: {error}")
+            context.todo(place, f"parameters: {error}")
     return read
 
 
-def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
-    """Return the path of a parameter file, or of the file that launch writes after substitutions.
+def _parameter_file(params: Any, context: RecordingContext, place: Any) -> str:
+    """Return the path of a parameter file.
+
+    If launch substitutes texts in the file, return a placeholder path for the file that launch
+    would write.
 
     Raises:
         FailedError: if a substitution cannot be resolved, or the file cannot be read.
     """
     is_described = isinstance(params, ParameterFile)
     arguments = arguments_of(params) if is_described else {"param_file": params}
-    file = shown(with_package(text_of(arguments["param_file"], context)))
+    file = display_text(with_package(text_of(arguments["param_file"], context)))
     if file.startswith(PACKAGE) or not is_true(arguments.get("allow_substs") or False, context):
         return file
     source = file_text(file)
     if "$(" not in source:
         return file
     parts = evaluate(lambda _: parse_substitution(source), context)
-    return file_of_text(file, source, text_of(parts, context), at, context)
+    return file_of_text(file, source, text_of(parts, context), place, context)
 
 
-def file_of_text(file: str, source: str, text: str, at: Any, context: RecordingContext) -> str:
+def file_of_text(file: str, source: str, text: str, place: Any, context: RecordingContext) -> str:
     """Return a placeholder path for the file that launch writes after substitutions.
 
     Raises:
@@ -237,29 +241,29 @@ def file_of_text(file: str, source: str, text: str, at: Any, context: RecordingC
         raise FailedError(f"{relative(file)} takes what a command makes of a file")
     unknown = set(re.findall(rf"{PACKAGE}\w+", text)) - set(re.findall(rf"{PACKAGE}\w+", source))
     for name in sorted(unknown):
-        context.todo(at, f"{relative(file)} names the package {name}, which was not found")
+        context.todo(place, f"{relative(file)} names the package {name}, which was not found")
     return context.file_of_text(file, text)
 
 
 def _flat(
-    params: Mapping[Any, Any], context: RecordingContext, above: str, at: Any
+    params: Mapping[Any, Any], context: RecordingContext, above: str, place: Any
 ) -> Iterator[tuple[str, Any]]:
-    """Yield parameters by full name, without those that cannot be resolved."""
+    """Yield parameters by their full names; report those that cannot be resolved."""
     for key, value in params.items():
         name = f"{above}{text_of(key, context)}"
         if isinstance(value, Mapping):
-            yield from _flat(value, context, f"{name}.", at)
+            yield from _flat(value, context, f"{name}.", place)
             continue
         try:
             yield name, parameter_value(value, context)
         except FailedError as error:
-            context.todo(at, f"the parameter {name}: {error}")
+            context.todo(place, f"the parameter {name}: {error}")
 
 
 def parameter_value(value: Any, context: RecordingContext) -> Any:
     """Return a parameter's value as launch passes it to the node.
 
-    The result of a substitution is read as YAML.
+    launch parses the result of a substitution as YAML.
 
     Raises:
         FailedError: if launch would reject it.
@@ -314,7 +318,7 @@ def _type_by_launch(value: Any, value_type: Any, context: RecordingContext) -> A
 
 
 def _keep_with_type(value: Any, value_type: Any, context: RecordingContext) -> str | None:
-    """Return the text with arguments as references, if they have the value's type."""
+    """Return the text with references to arguments, if the arguments have the value's type."""
     text = _parameter_text(value, context)
     argument = argument_of(text)
     if argument and context.declared.get(argument.name) == _KINDS.get(value_type):
@@ -334,9 +338,9 @@ def _parameter_text(value: Any, context: RecordingContext) -> str:
 
 
 def _read_as_yaml(value: Any, context: RecordingContext) -> Any:
-    """Return the value of a text read as YAML.
+    """Parse a text as YAML and return the value.
 
-    Arguments remain references if their value reads the same.
+    References to arguments remain if the text then has the same value.
     """
     text = _parameter_text(value, context)
     if files_in(text):
@@ -360,7 +364,7 @@ def _convert(text: str) -> Any:
     return value if isinstance(value, (bool, int, float, str, list)) else text
 
 
-# Conditions, as an expression of a robot file
+# Conditions
 
 
 def when_of(condition: Any, context: RecordingContext) -> str | None:
@@ -377,7 +381,7 @@ def when_of(condition: Any, context: RecordingContext) -> str | None:
 
 
 def describe_condition(condition: Any) -> str:
-    """Return a condition for display."""
+    """Return a readable text for a condition."""
     arguments = arguments_of(condition)
     if isinstance(condition, UnlessCondition):
         return f"not {describe(arguments['predicate_expression'])}"
@@ -422,7 +426,7 @@ def expression_of(value: Any, context: RecordingContext) -> str | None:
 
 
 def _alone(value: Any) -> Any:
-    """Return the only item of a list, as the frontends write a value; a text as such."""
+    """Return the only item of a list, because launch's frontends put each value into a list."""
     only = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
     return str(only.text) if isinstance(only, TextSubstitution) else only
 
@@ -452,12 +456,13 @@ def _of_python_expression(value: PythonExpression, context: RecordingContext) ->
 
 
 class _PythonText:
-    """The text of a Python condition, with names in place of arguments."""
+    """Parses a Python condition in which names replace launch arguments."""
 
     def __init__(self, context: RecordingContext) -> None:
         self._context = context
         self._text = ""
-        #: The arguments by the names that stand for them; within quotes the name is a text.
+        #: The arguments by the names that replace them. Inside quotes, such a name is part of a
+        #: text.
         self._arguments: dict[str, str] = {}
 
     def add(self, text: str) -> None:

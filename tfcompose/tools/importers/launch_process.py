@@ -1,9 +1,10 @@
-"""Reads launch files in a separate confined process, because a launch file is a program.
+"""The confined process that reads launch files.
 
-ROS's own ``launch`` reads it; this package has a reader for those of ROS 1. The process has no
-network, cannot start programs, write files or signal others, and reads only permitted files: the
-kernel refuses everything else (``sandbox``), and an audit hook of Python names what a launch file
-attempts.
+A launch file is a program, so it runs in a separate process with few rights. The process has no
+network, cannot start programs, write files or signal other processes, and can read only permitted
+files. The kernel refuses everything else (``sandbox``). An audit hook of Python reports the
+operation that a launch file attempts, with its line. ROS's own ``launch`` reads launch files of
+ROS 2; ``launch_ros1`` reads launch files of ROS 1.
 """
 
 from __future__ import annotations
@@ -86,37 +87,38 @@ _REFUSED = frozenset(
 )
 #: Audit events that read a path.
 _READS = frozenset({"open", "os.listdir", "os.scandir"})
-#: Packages of which only programs are named, that are not run here.
+#: Packages whose programs the import names but never runs. If such a package is missing, the
+#: import does not report it.
 _TOOLS = {"xacro"}
 
 
 class LaunchPackages:
-    """Finds packages: named and installed ones, and those around the launch file.
+    """Finds packages that the user names, that are installed, or that contain the launch file.
 
-    It reports missing ones to ``recording``.
+    It reports missing packages to ``recording``.
     """
 
     def __init__(self, packages: dict[str, str], prefixes: list[str]) -> None:
         self.recording: LaunchRecording | None = None
         self._packages, self._prefixes = packages, prefixes
         self._missed: set[str] = set(_TOOLS)
-        self._known: dict[tuple[str, Path], str | None] = {}
+        self._folders: dict[tuple[str, Path], str | None] = {}
 
     def find(self, name: str, file: str) -> str | None:
-        """Return the folder of a package that a launch file names."""
+        """Return the folder of a package that a launch file names; None if it is not found."""
         key = name, Path(file).parent
-        if key not in self._known:
-            self._known[key] = self._find(name, file)
-        if self._known[key] is None and name not in self._missed and self.recording:
+        if key not in self._folders:
+            self._folders[key] = self._find(name, file)
+        if self._folders[key] is None and name not in self._missed and self.recording:
             self._missed.add(name)
             self.recording.record("package", self.recording.here(), name=name)
-        return self._known[key]
+        return self._folders[key]
 
     def _find(self, name: str, file: str) -> str | None:
         installed = (f"{prefix}/share/{name}" for prefix in self._prefixes)
-        for known in (self._packages.get(name), *installed):
-            if known and Path(known).is_dir():
-                return str(Path(known).absolute())
+        for share in (self._packages.get(name), *installed):
+            if share and Path(share).is_dir():
+                return str(Path(share).absolute())
         for above in list(Path(file).absolute().parents)[:_HIGHEST]:
             for folder in (above, above / name):
                 manifest = folder / "package.xml"
@@ -134,11 +136,12 @@ class LaunchPackages:
 def _watch(  # noqa: C901 (one hook after another)
     recording: LaunchRecording, null: int, readable: Readable | None
 ) -> SavedFiles:
-    """Refuse and name what a launch file may not do; pass over what is often done and needless.
+    """Add an audit hook that refuses and reports forbidden operations of a launch file.
 
-    What it writes is kept.
+    The hook ignores frequent operations that have no effect on the import. It keeps the files that
+    the launch file writes in memory.
 
-    With ``readable`` paths it may do nothing else but read these.
+    If ``readable`` is set, the launch file may read only these paths.
     """
     noted: set[str] = set()
     saved = SavedFiles(recording, null)
@@ -231,9 +234,10 @@ def _watch(  # noqa: C901 (one hook after another)
 
 
 def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dict[str, Any]:
-    """Return the result of reading a launch file.
+    """Read a launch file and return the result.
 
-    Records, in order, and if reading stopped, the reason and the line.
+    The result contains the records in order. If reading stopped, it also contains the reason and
+    the line.
     """
     packages = LaunchPackages(request["packages"], request["prefixes"])
     stopped, line = "", 0
@@ -279,7 +283,7 @@ def _reader(
         recording = launch_ros1.Ros1Recording(packages.find, every_branch=every_branch)
         recording.arguments |= request["arguments"]
         return recording, lambda: launch_ros1.read(file, recording)
-    warnings.simplefilter("ignore")  # launch's advice is for whoever writes launch files
+    warnings.simplefilter("ignore")  # launch's warnings are for authors of launch files
     try:
         modules = importlib.import_module("tfcompose.tools.importers.launch_modules")
         recorder = importlib.import_module("tfcompose.tools.importers.launch_recorder")
@@ -298,8 +302,8 @@ def main(reads: int, writes: int) -> None:
     channel = Channel(reads, writes)
     request = channel.receive()
     limit(request["wall_s"])
-    tempfile.tempdir = request["temporary"]  # else Python would look for one by writing
-    null = os.open(os.devnull, os.O_RDWR)  # no file can be opened for writing after this
+    tempfile.tempdir = request["temporary"]  # otherwise Python tests folders by writing to them
+    null = os.open(os.devnull, os.O_RDWR)  # after this, the process cannot open files for writing
     readable = Readable(*request["readable"]) if request["readable"] else None
     channel.send({"missing": confine(readable) if readable else []})
     answered = answer(request, null, readable)

@@ -1,8 +1,9 @@
-"""Records what ROS's own ``launch`` would start, without starting anything.
+"""Recorder of the actions that ROS's own ``launch`` would execute.
 
-Launch parses the file, checks the arguments of its actions, and evaluates its substitutions,
-conditions and groups, including those of other packages. Visiting an action that would start
-something records it. This runs in the process that reads launch files (``launch_process``).
+Launch parses the file, checks the arguments of its actions, and evaluates substitutions,
+conditions and groups, including classes of other packages. The recorder visits each action. If the
+action would start a process, the recorder adds a record instead. This module runs in the process
+that reads launch files (``launch_process``).
 """
 
 from __future__ import annotations
@@ -62,9 +63,10 @@ from tfcompose.tools.importers.texts import Text, argument_of
 
 
 def attach() -> None:
-    """Make launch record instead of starting anything.
+    """Make launch record actions instead of executing them.
 
-    Nothing is logged, because launch would make a folder for its log, which the sandbox forbids.
+    This also turns launch's logging off, because launch would create a log folder, which the
+    sandbox forbids.
     """
     config = launch.logging.launch_config
     config.log_dir = tempfile.gettempdir()
@@ -102,7 +104,7 @@ def description_of(path: str) -> Any:
     except (FailedError, MemoryError):
         raise
     except SyntaxError as error:
-        # that of XML has its line elsewhere
+        # an error of the XML parser has no lineno
         line = error.lineno or objects.line_of(error, path)
         raise FailedError(str(error.msg), line) from None
     except BaseException as error:  # noqa: BLE001 (any can come out of it)
@@ -111,9 +113,10 @@ def description_of(path: str) -> Any:
 
 
 def _parse(path: str) -> tuple[Any, Any]:
-    """Return the root of a launch file in another language, and its parser.
+    """Return the root entity of an XML or YAML launch file, and its parser.
 
-    Launch tries all its parsers, and tells of all their errors; here it is that of the language.
+    Launch itself tries all parsers and reports the errors of all. This function uses only the
+    parser for the file's format, so that the error is about this format.
     """
     parsers = launch.frontend.Parser.get_parsers_from_filename(path)
     with Path(path).open(encoding="utf-8-sig") as file:
@@ -125,7 +128,7 @@ def _parse(path: str) -> tuple[Any, Any]:
         return loaded
 
 
-# Substitutions whose text would be this machine's, or that of a program that is not run
+# Substitutions whose text depends on this machine or on the output of a program
 
 
 def _command(self: Any, context: Any) -> str:
@@ -147,7 +150,10 @@ _PERFORMED: dict[Any, Callable[[Any, Any], str]] = {
 
 
 def _note_decisions(kind: Any) -> None:
-    """Let arguments whose value launch asks for be known as those that decide."""
+    """Make a substitution record the launch argument whose value it reads.
+
+    The value of such an argument is fixed in the robot file.
+    """
     performed = kind.perform
 
     def perform(self: Any, context: Any) -> Any:
@@ -164,7 +170,7 @@ def _note_decisions(kind: Any) -> None:
 
 
 def visit_all(entities: Any, context: RecordingContext) -> None:
-    """Visit everything that launch would visit, in order."""
+    """Visit the entities in the order in which launch would execute them."""
     if entities is None:
         return
     for entity in entities if isinstance(entities, (list, tuple)) else [entities]:
@@ -177,7 +183,7 @@ def visit_all(entities: Any, context: RecordingContext) -> None:
 
 
 def _visit(action: Any, context: RecordingContext) -> None:
-    """Do what an action does, if its condition holds."""
+    """Visit an action if its condition is true."""
     handler = next((_HANDLERS[kind] for kind in type(action).__mro__ if kind in _HANDLERS), None)
     condition = getattr(action, "condition", None)
     _if_holds(action, condition, lambda: (handler or _let_launch)(action, context), context)
@@ -186,8 +192,11 @@ def _visit(action: Any, context: RecordingContext) -> None:
 def _if_holds(
     made: Any, condition: Any, execute: Callable[[], None], context: RecordingContext
 ) -> None:
-    """Execute what launch would if its condition holds; with every branch, in any case."""
-    at = context.at = place_of(made)
+    """Call ``execute`` if the condition is true.
+
+    If the import reads all branches, call it in any case.
+    """
+    place = context.at = place_of(made)
     if condition is None:
         _execute(made, execute, context)
         return
@@ -206,13 +215,13 @@ def _if_holds(
             name = describe(arguments_of(condition)["launch_configuration_name"])
             context.decided |= {name} & context.declared.keys()
     except FailedError as error:
-        context.todo(at, f"{describe_action(made)} if {text}: {error}")
+        context.todo(place, f"{describe_action(made)} if {text}: {error}")
         return
     if not holds and not context.every_branch:
-        context.record("skipped", at, text=f"{describe_action(made)} only if {text}")
+        context.record("skipped", place, text=f"{describe_action(made)} only if {text}")
         return
     if context.every_branch:
-        context.todo(at, f"the condition of {describe_action(made)}: {text}")
+        context.todo(place, f"the condition of {describe_action(made)}: {text}")
     context.conditions.append(text if holds else f"{text}, which does not hold")
     try:
         _execute(made, execute, context)
@@ -221,25 +230,25 @@ def _if_holds(
 
 
 def _execute(made: Any, execute: Callable[[], None], context: RecordingContext) -> None:
-    at = place_of(made)
+    place = place_of(made)
     try:
         execute()
     except FailedError as error:
-        context.todo(at, f"{describe_action(made)}: {error}")
+        context.todo(place, f"{describe_action(made)}: {error}")
     except (TypeError, ValueError, AttributeError, LookupError) as error:
-        # what it was given is of another kind
-        context.todo(at, f"{describe_action(made)}: {type(error).__name__}: {error}")
+        # an argument of the action has the wrong type
+        context.todo(place, f"{describe_action(made)}: {type(error).__name__}: {error}")
 
 
 def _let_launch(action: Any, context: RecordingContext) -> None:
-    """Let an action do what it does, and visit what it gives."""
+    """Let launch execute an action, and visit the entities that it returns."""
     if isinstance(action, launch.actions.ExecuteLocal):
         raise FailedError("it starts a process in an unknown way")
     visit_all(evaluate(action.execute, context), context)
 
 
 def describe_action(made: Any) -> str:
-    """Return a description of an action, for display."""
+    """Return a readable description of an action."""
     for kind, describe_it in _DESCRIBED:
         if isinstance(made, kind):
             return describe_it(arguments_of(made))
@@ -262,7 +271,8 @@ def _describe_node(arguments: Mapping[str, Any]) -> str:
     return f"the node {describe(arguments.get('package'))}/{describe(arguments['executable'])}"
 
 
-#: Descriptions of actions for people, by class; a derived class comes before its base.
+#: Functions that return a readable description of an action, by class. A derived class comes
+#: before its base class.
 _DESCRIBED: tuple[tuple[type, Callable[[Mapping[str, Any]], str]], ...] = (
     (
         launch.actions.DeclareLaunchArgument,
@@ -313,7 +323,7 @@ def _declare(action: Any, context: RecordingContext) -> None:
 
 
 def _variable_of(default: Any, context: RecordingContext) -> str:
-    """Return the environment variable that is an argument's default, or nothing."""
+    """Return the environment variable that sets an argument's default; empty if none does."""
     only = default[0] if isinstance(default, (list, tuple)) and len(default) == 1 else default
     if not isinstance(only, substitutions.EnvironmentVariable):
         return ""
@@ -351,7 +361,7 @@ def _set_parameter(action: Any, context: RecordingContext) -> None:
     evaluate(action.execute, context)
     name, value = text_of(arguments["name"], context), parameter_value(arguments["value"], context)
     if isinstance(value, str) and not isinstance(value, Text):
-        value = yaml.safe_load(value)  # it goes onto the command line
+        value = yaml.safe_load(value)  # the value is part of a command line
     context.params.append({name: value})
 
 
@@ -394,8 +404,8 @@ def _ignore(_action: Any, _context: RecordingContext) -> None:
     pass
 
 
-#: The event handlers that a robot file has a word for, with the parameters that name the action
-#: and what happens then.
+#: Event handlers that a robot file can express. Each has the names of two parameters, which
+#: contain the awaited action and the actions that follow, and the event.
 _AFTER: dict[type, tuple[str, str, str]] = {
     event_handlers.OnProcessExit: ("done", "target_action", "on_exit"),
     event_handlers.OnExecutionComplete: ("done", "target_action", "on_completion"),
@@ -406,16 +416,16 @@ _AFTER: dict[type, tuple[str, str, str]] = {
 
 def _register(action: Any, context: RecordingContext) -> None:
     handler = arguments_of(action)["event_handler"]
-    arguments, at = arguments_of(handler), place_of(action)
+    arguments, place = arguments_of(handler), place_of(action)
     event, of_target, of_entities = _AFTER.get(type(handler), ("", "", ""))
     target, entities = arguments.get(of_target), arguments.get(of_entities)
     entities = entities if isinstance(entities, (list, tuple)) else [entities]
     if not isinstance(target, launch.Action) or any(map(callable, entities)):
-        context.todo(at, f"what happens {type(handler).__name__}")
+        context.todo(place, f"what happens {type(handler).__name__}")
         return
     for entity in entities:
         if event == "done" and _ends_all(entity):
-            context.record("required", at, node=id_of(target))
+            context.record("required", place, node=id_of(target))
             continue
         before = dict(context.after)
         context.after[str(id_of(target))] = event
@@ -443,7 +453,7 @@ def _wait(action: Any, context: RecordingContext) -> None:
 
 
 def _location_of(action: Any) -> Any:
-    """Return where an included file is, or the description that is given in its place."""
+    """Return the path of an included file, or the launch description that replaces the file."""
     source = arguments_of(action)["launch_description_source"]
     if not isinstance(source, LaunchDescriptionSource):
         return source
@@ -482,7 +492,7 @@ def _include(action: Any, context: RecordingContext) -> None:
 
 
 def _set_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
-    """Set the arguments of an included file; return them with those that stand for themselves."""
+    """Set the arguments of an included file, and return their texts with references."""
     values: dict[str, str] = {}
     pairs = arguments_of(action).get("launch_arguments") or ()
     for name, value in pairs.items() if isinstance(pairs, Mapping) else pairs:
@@ -490,7 +500,7 @@ def _set_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
             argument, kept = text_of(name, context), keep_text(value, context)
             text = text_of(value, context)
         except FailedError as error:
-            # the file has a default for it, or says what it cannot do without
+            # the included file has a default, or launch reports that it is required
             context.todo(
                 place_of(action),
                 f"the argument {describe(name)} of {describe_action(action)}: {error}",
@@ -505,7 +515,9 @@ def _set_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
 
 
 def include(path: str, context: RecordingContext) -> None:
-    """Visit a launch file's description; after the outermost one, the delayed visits.
+    """Visit the description of a launch file.
+
+    After the outermost file, also make the delayed visits.
 
     Raises:
         FailedError: if launch refuses it.
@@ -556,7 +568,7 @@ def _container(action: Any, context: RecordingContext) -> None:
 
 
 def _record_node(action: Any, kind: str, context: RecordingContext, **more: Any) -> None:
-    """Record a node with all that it is told."""
+    """Record a node with all its settings."""
     arguments = arguments_of(action)
     argv = [keep_text(argument, context) for argument in arguments.get("arguments") or ()]
     ros_argv = [text_of(argument, context) for argument in arguments.get("ros_arguments") or ()]
@@ -575,7 +587,7 @@ def _record_node(action: Any, kind: str, context: RecordingContext, **more: Any)
 def _of_node(
     action: Any, arguments: Mapping[str, Any], context: RecordingContext
 ) -> dict[str, Any]:
-    """Return what a node has, in its own process or in a container's."""
+    """Return the settings of a node or component."""
     global_rules = context.launch_configurations.get("ros_remaps", ())
     rules = [
         (text_of(old, context), keep_text(new, context))
@@ -593,7 +605,7 @@ def _of_node(
 
 
 def _namespace(namespace: Any, context: RecordingContext) -> str | None:
-    """Return a node's namespace, absolute; None where nothing is said of it."""
+    """Return the absolute namespace of a node; None if the launch file sets none."""
     base = context.launch_configurations.get("ros_namespace")
     full: str | None = make_namespace_absolute(
         prefix_namespace(base, optional_text(namespace, context))
@@ -604,7 +616,7 @@ def _namespace(namespace: Any, context: RecordingContext) -> str | None:
 def _common(
     action: Any, arguments: Mapping[str, Any], context: RecordingContext
 ) -> dict[str, Any]:
-    """Return what any process can be told."""
+    """Return the settings that every process can have."""
     variables = [arguments.get(keyword.name) for keyword in launch_keywords("variables")]
     env = context.variables
     for values in variables:
@@ -633,14 +645,14 @@ def _common(
     return what
 
 
-#: The keyword whose default is a launch configuration, of the name of its attribute.
+#: The keyword ``prefix``. Its default is the launch configuration with the name of its attribute.
 _PREFIX = "prefix"
 
 
 def _global_prefix(
     name: str, arguments: Mapping[str, Any], context: RecordingContext
 ) -> dict[str, str]:
-    """Return the prefix that launch configurations set for all programs, or those of a filter."""
+    """Return the prefix from launch configurations, if the program matches their filter."""
     configured = context.launch_configurations
     program = text_of(arguments.get("executable") or arguments["cmd"][0], context)
     is_meant = re.match(configured.get(f"{name}-filter", ""), posixpath.basename(program))
@@ -656,12 +668,12 @@ _OUTPUTS = frozenset({"screen", "log", "both", "own_log", "full"})
 
 
 def _output(value: Any, context: RecordingContext) -> str | list[str]:
-    """Return launch's word for where the output goes.
+    """Return launch's value for ``output``.
 
-    The places where the word is not one of launch's but a mapping.
+    If the value is a mapping of streams, return the list of its destinations.
 
     Raises:
-        FailedError: if launch has no such word.
+        FailedError: if launch does not know the value.
     """
     if isinstance(value, Mapping):
         outputs: set[str] = set()
@@ -699,7 +711,10 @@ def _load_into(action: Any, context: RecordingContext) -> None:
 
 
 def _load(action: Any, components: Any, container: str, context: RecordingContext) -> None:
-    """Record components; ``container`` is their action's id or its node's full name."""
+    """Record components.
+
+    ``container`` is the id of the container's action, or the full name of its node.
+    """
     for component in components or ():
         if not isinstance(component, launch_ros.descriptions.ComposableNode):
             context.todo(place_of(action), f"{type(component).__name__} is not a component")
@@ -715,14 +730,14 @@ def _load(action: Any, components: Any, container: str, context: RecordingContex
 
 def _component(component: Any, container: str, context: RecordingContext) -> None:
     arguments = arguments_of(component)
-    at = place_of(component)
+    place = place_of(component)
     more = {
-        keyword.name: parameters_of(arguments.get(keyword.name), context, at)
+        keyword.name: parameters_of(arguments.get(keyword.name), context, place)
         for keyword in launch_keywords("parameters")
     }
     context.record(
         "component",
-        at,
+        place,
         id=id_of(component),
         container=container,
         plugin=text_of(arguments["plugin"], context),

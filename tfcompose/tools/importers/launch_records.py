@@ -1,6 +1,7 @@
-"""Records of the processes that launch files start, the same for each reader.
+"""Records of the processes that a launch file starts.
 
-This runs in the process that reads launch files (``launch_process``).
+The readers for ROS 1 and ROS 2 write the same records. This module runs in the process that reads
+launch files (``launch_process``).
 """
 
 from __future__ import annotations
@@ -16,16 +17,17 @@ from tfcompose.tools.importers.texts import FileText, Part, Text, as_json, parts
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-#: As what the folder of a package begins that is not found.
+#: The beginning of the address that replaces the folder of a missing package.
 PACKAGE = "package://"
-#: Numbers of actions in records; Python reuses an ``id`` once an action is gone.
+#: Numbers that identify actions in records. Python's ``id`` cannot be used, because Python reuses
+#: it after it deletes an action.
 IDS = itertools.count(1)
 
 
 class FailedError(Exception):
     """A part of a launch file cannot be resolved.
 
-    ``line`` is set if the error is about a whole file, else 0.
+    If the error is about a whole file, ``line`` is its line in the file; else it is 0.
     """
 
     def __init__(self, reason: str, line: int = 0) -> None:
@@ -34,42 +36,39 @@ class FailedError(Exception):
 
 
 class LaunchRecording:
-    """The resolved contents of a launch file.
-
-    ``records`` has them in order.
-    """
+    """The contents of a launch file, as ``records`` in the order of the file."""
 
     def __init__(
         self, find: Callable[[str, str], str | None], *, every_branch: bool = False
     ) -> None:
         self.find, self.every_branch = find, every_branch
         self.records: list[dict[str, Any]] = []
-        #: The file and line of what is read now.
+        #: The file and line that is being read.
         self.at: tuple[str, int] = ("", 1)
         self.conditions: list[str] = []
         self.whens: list[str] = []
         self.period_s = 0.0
         self.after: dict[str, str] = {}
-        #: The types of launch arguments that a robot file can have as its own, by name.
+        #: The types of launch arguments that can become arguments of the robot file, by name.
         self.declared: dict[str, str] = {}
-        #: Those whose value decided something that stands in the robot file as it is now.
+        #: Launch arguments whose current value determined a part of the robot file.
         self.decided: set[str] = set()
         self.depth = 0
-        #: The texts of files that launch or its file makes, by the paths that stand for them.
+        #: The texts of files that launch or the launch file creates, by placeholder path.
         self.files: dict[str, str] = {}
 
     def here(self) -> tuple[str, int]:
         """Return the file and line being read."""
         return self.at
 
-    def record(self, kind: str, at: Any, **what: Any) -> None:
+    def record(self, kind: str, place: Any, **what: Any) -> None:
         """Record an action."""
         more: dict[str, Any] = {"when": list(self.conditions)} if self.conditions else {}
         more |= {"only_when": " and ".join(dict.fromkeys(self.whens))} if self.whens else {}
-        self.records.append({"kind": kind, "at": at, **more, **what})
+        self.records.append({"kind": kind, "at": place, **more, **what})
 
     def file_of_text(self, source: str, text: str) -> str:
-        """Keep the text of a file that launch writes; return its placeholder path."""
+        """Keep the text of a file that launch would write; return its placeholder path."""
         source = os.path.abspath(source)  # noqa: PTH100 (links stay)
         begin = source.rpartition("#")[0] if source in self.files else source
         for number in itertools.count(1):
@@ -78,12 +77,12 @@ class LaunchRecording:
                 return path
         raise AssertionError
 
-    def todo(self, at: Any, text: str) -> None:
-        """Record a part of a launch file that is not resolved."""
-        self.record("todo", at, text=shown(text))
+    def todo(self, place: Any, text: str) -> None:
+        """Record a part of a launch file that cannot be resolved."""
+        self.record("todo", place, text=display_text(text))
 
     def declare(self, name: str, value: str) -> None:
-        """Register an argument that the robot file may declare too."""
+        """Register a launch argument that can become an argument of the robot file."""
         kinds = {bool: "bool", int: "int", float: "float", str: "string"}
         if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
             self.declared[name] = kinds[type(scalar_of(value))]
@@ -91,8 +90,8 @@ class LaunchRecording:
     def argument_kept(self, name: str, value: str, *, typed: bool = False) -> bool:
         """Return whether a reference to the argument can replace its value.
 
-        Otherwise the value is written, and it is fixed. ``typed``: it may be 10.0, which texts
-        lose.
+        If it cannot, the robot file gets the value, and the argument is fixed. ``typed``: a value
+        such as 10.0 can be replaced, because the reference keeps the type.
         """
         if name not in self.declared:
             return False
@@ -107,7 +106,7 @@ class LaunchRecording:
 
 
 def scalar_of(text: str) -> Any:
-    """Return a launch argument's value: a bool, a number as written, or the text."""
+    """Return a launch argument's value: a bool, a number, or the text."""
     if text.lower() in {"true", "false"}:
         return text.lower() == "true"
     if re.fullmatch(r"-?(0|[1-9][0-9]{0,15})", text) and text != "-0":
@@ -118,29 +117,29 @@ def scalar_of(text: str) -> Any:
 
 
 def conjunction(parts: Iterable[str | None], separator: str) -> str | None:
-    """Return the conjunction of conditions of a robot file, None if one cannot be expressed."""
+    """Join conditions of a robot file; return None if one of them is None."""
     conditions = list(parts)
     if not all(conditions):
         return None
     return separator.join(f"({condition})" for condition in conditions)
 
 
-# Texts of files, while the launch file has them in its hands
+# Placeholders for the texts of files
 
 _FILES: dict[str, FileText] = {}
 _PLACEHOLDER = re.compile(r'(<robot name="tfcompose_text_\d+"/>)')
 
 
 def placeholder(file: str, args: dict[str, str] | None = None) -> str:
-    """Return a description that a launch file can pass on instead of a file's text."""
+    """Return a placeholder that a launch file can pass on instead of a file's text."""
     text = f'<robot name="tfcompose_text_{len(_FILES)}"/>'
     _FILES[text] = FileText(with_package(file), args or {})
     return text
 
 
 def with_files(text: str) -> str:
-    """Return a text with the placeholders in it replaced by their files, as parts."""
-    return Text.of(part for known in parts_of(text) for part in _split(known))
+    """Return a ``Text`` in which each placeholder is replaced by its file."""
+    return Text.of(part for piece in parts_of(text) for part in _split(piece))
 
 
 def _split(part: Part) -> Iterable[Part]:
@@ -149,8 +148,8 @@ def _split(part: Part) -> Iterable[Part]:
     return [_FILES.get(piece, piece) for piece in _PLACEHOLDER.split(part)]
 
 
-def shown(text: str) -> str:
-    """Return a text for display, with the names of files instead of their texts."""
+def display_text(text: str) -> str:
+    """Return a readable text, with the names of files instead of their texts."""
     return str(with_files(text))
 
 
@@ -169,9 +168,9 @@ def jsonable(value: Any) -> Any:
 
 
 def with_package(path: str) -> str:
-    """Return a path below a missing package as an address.
+    """Return a path below a missing package as a ``package://`` address.
 
-    pathlib reduces two slashes to one.
+    pathlib turns the two slashes of such an address into a single slash; this restores them.
     """
     if "package:/" not in path or isinstance(path, Text):
         return path
@@ -179,10 +178,10 @@ def with_package(path: str) -> str:
 
 
 def of_command(argv: list[str], text: str) -> str:
-    """Return the placeholder for the output of a command that makes a robot's description.
+    """Return the placeholder for the output of a command that writes a description.
 
     Raises:
-        FailedError: for any other command: none is run.
+        FailedError: for any other command, because the import runs no commands.
     """
     program = Path(argv[0]).name if argv else ""
     rest = [with_package(argument) for argument in argv[1:]]
@@ -214,5 +213,5 @@ def file_text(path: str) -> str:
 
 
 def relative(text: str) -> str:
-    """Return a path for display, relative to the folder of the import."""
+    """Return a readable path, relative to the folder in which the import runs."""
     return os.path.relpath(text) if os.path.isabs(text) and os.path.exists(text) else text  # noqa: PTH110, PTH117

@@ -1,7 +1,8 @@
-"""Launch files that need no launch: ROS 1's roslaunch XML, and lines of static transforms.
+"""Reader of launch files in ROS 1's XML, and of XML with only static transforms.
 
-Elements and substitutions follow the documentation of roslaunch and rosparam. This runs in the
-process that reads launch files (``launch_process``): ``$(eval …)`` is Python.
+This reader does not need ROS. Elements and substitutions follow the documentation of roslaunch and
+rosparam. Because ``$(eval …)`` contains Python, this module runs in the confined process that
+reads launch files (``launch_process``).
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ if TYPE_CHECKING:
 
 #: Maximum depth of launch files that include each other.
 _DEEPEST = 30
-#: Features that only launch files of ROS 1 have: attributes by their elements, elements, and
-#: substitutions.
+#: Attributes, elements and substitutions that only launch files of ROS 1 have. Each attribute is a
+#: pair of its element and its name.
 _ATTRIBUTES = frozenset({("node", "type"), ("param", "command"), ("param", "textfile")})
 _ELEMENTS = frozenset({"rosparam", "machine", "test"})
 _SUBSTITUTION = re.compile(r"\$\((arg|find|optenv|env|anon|dirname|eval)\b\s*([^)]*)\)")
@@ -52,7 +53,7 @@ _OF_ROS1 = re.compile(r"\$\((arg|find|optenv)\s")
 
 
 class Ros1Recording(LaunchRecording):
-    """The recording of a ROS 1 launch file, and the scope that its elements change."""
+    """The recording of a ROS 1 launch file, with the scope that its elements change."""
 
     def __init__(
         self, find: Callable[[str, str], str | None], *, every_branch: bool = False
@@ -86,7 +87,7 @@ def is_of_ros1(text: str, file: str) -> bool:
 
 
 def has_only_transforms(text: str, file: str) -> bool:
-    """Return whether a launch file in XML has only static_transform_publisher lines."""
+    """Return whether an XML launch file starts only static_transform_publishers."""
     root = _launch_in(text, file)
     return root is not None and bool(root.children) and all(map(_is_transform, root.children))
 
@@ -124,7 +125,7 @@ def read(file: str, recording: Ros1Recording) -> None:
     """Record the processes of a launch file.
 
     Raises:
-        FailedError: if it is none, or includes itself.
+        FailedError: if the file is not a launch file, or includes itself.
     """
     if recording.depth >= _DEEPEST:
         raise FailedError("launch files include each other")
@@ -154,36 +155,37 @@ def _root(file: str) -> Element:
 
 
 def _visit(element: Element, recording: Ros1Recording) -> None:
-    """Do what an element says, if its condition holds."""
+    """Record an element, if its condition is true."""
     recording.at = (recording.file, element.span.line)
-    at = recording.at
+    place = recording.at
     try:
         when, holds = _condition(element, recording)
     except FailedError as error:
-        recording.todo(at, f"{_describe(element)}: {error}")
+        recording.todo(place, f"{_describe(element)}: {error}")
         return
     text = element.attributes.get("if") or f"not {element.attributes.get('unless')}"
     if holds is False and not recording.every_branch:
-        recording.record("skipped", at, text=f"{_describe(element)} only if {text}")
+        recording.record("skipped", place, text=f"{_describe(element)} only if {text}")
         return
     conditions, whens = list(recording.conditions), list(recording.whens)
     if when:
         recording.whens.append(when)
     elif holds is not None and recording.every_branch:
-        recording.todo(at, f"the condition of {_describe(element)}: {text}")
+        recording.todo(place, f"the condition of {_describe(element)}: {text}")
         recording.conditions.append(text if holds else f"{text}, which does not hold")
     try:
         _read_element(element, recording)
     except FailedError as error:
-        recording.todo(at, f"{_describe(element)}: {error}")
+        recording.todo(place, f"{_describe(element)}: {error}")
     finally:
         recording.conditions, recording.whens = conditions, whens
 
 
 def _condition(element: Element, recording: Ros1Recording) -> tuple[str | None, bool | None]:
-    """Return an element's condition as an expression of a robot file, and whether it holds.
+    """Return an element's condition as an expression of a robot file, and its value.
 
-    The expression is None where conditions are decided now.
+    The expression is None if the robot file does not contain the condition. The value is None if
+    the element has no condition.
     """
     name = "if" if "if" in element.attributes else "unless"
     if name not in element.attributes:
@@ -220,7 +222,7 @@ def _read_element(element: Element, recording: Ros1Recording) -> None:
 
 
 class _Attributes:
-    """An element's attributes, and which of them are read."""
+    """The attributes of an element, with a record of the attributes that were read."""
 
     def __init__(self, element: Element, recording: Ros1Recording) -> None:
         self.element, self._recording = element, recording
@@ -229,13 +231,16 @@ class _Attributes:
         self._inside: set[str] = set()
 
     def get(self, name: str) -> str | None:
-        """Return the text of an attribute, with arguments in it, or None."""
+        """Return the text of an attribute, with references to arguments, or None."""
         self._read.add(name)
         text = self.element.attributes.get(name)
         return None if text is None else _text(text, self._recording)
 
     def value(self, name: str) -> str | None:
-        """Return the same with the values of arguments, which decide then."""
+        """Return the text of an attribute with the values of arguments, or None.
+
+        The values of these arguments are then fixed in the robot file.
+        """
         text = self.get(name)
         if text is None:
             return None
@@ -246,7 +251,7 @@ class _Attributes:
         """Return the text of an attribute.
 
         Raises:
-            FailedError: if there is none.
+            FailedError: if the element does not have the attribute.
         """
         text = self.get(name)
         if text is None:
@@ -254,7 +259,7 @@ class _Attributes:
         return text
 
     def all(self, tag: str) -> list[_Attributes]:
-        """Return what is inside of a tag."""
+        """Return the child elements with a tag."""
         self._inside.add(tag)
         return [
             _Attributes(child, self._recording)
@@ -263,7 +268,7 @@ class _Attributes:
         ]
 
     def unread(self) -> list[str]:
-        """Return the attributes and elements that were not asked for."""
+        """Return the attributes and child elements that were not read."""
         left = [name for name in self.element.attributes if name not in self._read]
         tags = (child.tag for child in self.element.children if child.tag not in self._inside)
         return [*left, *(f"<{tag}>" for tag in dict.fromkeys(tags))]
@@ -273,7 +278,7 @@ class _Attributes:
 
 
 def _text(text: str, recording: Ros1Recording) -> str:
-    """Return a text with its substitutions done; arguments stand for themselves where they may."""
+    """Return a text after substitutions, with references to arguments where possible."""
     if text.startswith("$(eval ") and text.endswith(")"):
         return _evaluate(text[len("$(eval ") : -1], recording)
     parts: list[Part] = []
@@ -314,7 +319,7 @@ def _argument(name: str, recording: Ros1Recording) -> str:
 
 
 def _evaluate(expression: str, recording: Ros1Recording) -> str:
-    """Return what a Python expression gives, which names arguments."""
+    """Return the result of a Python expression that contains arguments."""
 
     def argument(name: str) -> Any:
         recording.decided |= {name} & recording.declared.keys()
@@ -345,7 +350,7 @@ def _evaluate(expression: str, recording: Ros1Recording) -> str:
 def _arg(element: _Attributes, recording: Ros1Recording) -> None:
     name, default = str(element.need("name")), element.value("default")
     fixed = element.value("value")
-    if fixed is not None:  # no other value can be given
+    if fixed is not None:  # the value cannot be changed
         recording.declared.pop(name, None)
         recording.arguments[name] = fixed
         return
@@ -372,7 +377,11 @@ def _param(element: _Attributes, recording: Ros1Recording) -> None:
 
 
 def _parameter(element: _Attributes) -> tuple[str, Any]:
-    """Return a parameter's name and value: what a command prints, a file's text, or as it is."""
+    """Return a parameter's name and value.
+
+    The value is the attribute itself, the text of a file, or the placeholder for a command's
+    output.
+    """
     name, kind = str(element.need("name")), element.value("type")
     if (command := element.value("command")) is not None:
         return name, of_command(list(map(str, words_of(command))), command)
@@ -422,7 +431,7 @@ def _node(element: _Attributes, recording: Ros1Recording) -> None:
 
 
 def _keywords(element: _Attributes) -> dict[str, Any]:
-    """Return what a node is told in launch's words."""
+    """Return the settings of a node, with launch's keywords."""
     keywords: dict[str, Any] = {}
     for keyword in launch_keywords("text", "switch", "number", "output"):
         text = element.value(keyword.attribute or keyword.name)
@@ -505,7 +514,7 @@ def _env(element: _Attributes, recording: Ros1Recording) -> None:
 
 
 def _below(base: str | None, namespace: str | None) -> str | None:
-    """Return a namespace below another one, absolute; None where neither is given."""
+    """Join two namespaces to an absolute namespace; return None if both are None."""
     if base is None and namespace is None:
         return None
     if namespace is not None and namespace.startswith("/"):

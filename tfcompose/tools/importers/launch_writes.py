@@ -1,6 +1,7 @@
-"""Files that a launch file writes when it starts: texts, which the import takes along.
+"""Files that a launch file writes when it starts, kept in memory for the import.
 
-Nothing reaches the disk.
+The launch file believes that it writes to the disk. The import writes the texts next to the robot
+file if the robot file names them.
 """
 
 from __future__ import annotations
@@ -25,21 +26,21 @@ _write = os.write
 class SavedFiles:
     """The files that a launch file has written, by path.
 
-    It can read them back like others, and also those that launch writes. ``finish`` reports the
-    rest: folders without such a file, and temporary names that were not used.
+    The launch file can read these files back, and also the files that launch writes. ``finish``
+    reports folders in which it wrote no file, and temporary names that it did not use.
     """
 
     def __init__(self, recording: LaunchRecording, null: int) -> None:
         self.texts = recording.files
         self._null = null
-        #: The paths of files that are open by a number alone.
+        #: The paths of open files by file descriptor.
         self._descriptors: dict[int, str] = {}
         self._recording = recording
         self._folders: dict[str, tuple[str, int]] = {}
         self._temporary: dict[str, tuple[str, int]] = {}
 
     def open(self, file: str | int, mode: str) -> Any | None:
-        """Return a file as ``open`` does, or None if it is to be opened on the disk."""
+        """Return a file as ``open`` does, or None if the caller should open it on the disk."""
         name = self._descriptors.get(file) if isinstance(file, int) else file
         if name is None:
             return None
@@ -66,7 +67,7 @@ class SavedFiles:
         dir: str | None = None,  # noqa: A002 (as tempfile has it)
         **_more: Any,
     ) -> Any:
-        """Return a file with a name, as tempfile's NamedTemporaryFile does."""
+        """Return a named file as ``tempfile.NamedTemporaryFile`` does."""
         return self.open(self._name(suffix, prefix, dir), mode.replace("+", ""))
 
     def open_descriptor(
@@ -76,7 +77,7 @@ class SavedFiles:
         dir: str | None = None,  # noqa: A002 (as tempfile has it)
         text: bool = False,  # noqa: FBT001, FBT002 (as tempfile has it)
     ) -> tuple[int, str]:
-        """Return a descriptor and a name, as tempfile's mkstemp does."""
+        """Return a descriptor and a name as ``tempfile.mkstemp`` does."""
         del text
         path = self._name(suffix, prefix, dir)
         self.open(path, "w")
@@ -98,7 +99,7 @@ class SavedFiles:
         prefix: str = "tmp",
         dir: str | None = None,  # noqa: A002 (as tempfile has it)
     ) -> str:
-        """Return a name, as tempfile's mktemp does."""
+        """Return a name as ``tempfile.mktemp`` does."""
         path = self._name(suffix, prefix, dir)
         self._temporary[path] = self._recording.here()
         return path
@@ -108,19 +109,19 @@ class SavedFiles:
         return f"{folder or tempfile.gettempdir()}/{prefix or 'tmp'}{number}{suffix or ''}"
 
     def folder(self, path: Any, *_args: Any, **_more: Any) -> None:
-        """Record that a folder would be made."""
+        """Record that the launch file would create a folder."""
         name = os.path.abspath(os.fsdecode(path))  # noqa: PTH100 (links stay)
         self._folders.setdefault(name, self._recording.here())
 
     def finish(self) -> None:
-        """Report the other things that would have been made."""
-        for path, at in self._folders.items():
+        """Report folders without a file, and unused temporary names."""
+        for path, place in self._folders.items():
             if not any(PurePath(file).is_relative_to(path) for file in self.texts):
-                self._recording.todo(at, f"the folder {path} was not created")
-        for path, at in self._temporary.items():
+                self._recording.todo(place, f"the folder {path} was not created")
+        for path, place in self._temporary.items():
             if path not in self.texts:
                 self._recording.todo(
-                    at, f"the temporary file {path}: its name changes at each launch"
+                    place, f"the temporary file {path}: its name changes at each launch"
                 )
 
 

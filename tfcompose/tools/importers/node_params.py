@@ -1,4 +1,4 @@
-"""Parameters of a node in the form of a robot file."""
+"""Conversion of a node's parameters to the form of a robot file."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import ImportDraft
     from tfcompose.tools.importers.program import Program
 
-#: Parameters by the names of nodes, and where these are not one, by the place in order.
+#: Parameters by the name of their node and a number, which separates several sections for the same
+#: node.
 _Sections = dict[tuple[str, int], dict[str, Any]]
-#: The section of a parameter file that means every node.
+#: The section of a parameter file that applies to every node.
 _ANY = "/**"
 _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 #: Maximum size of a parameter file.
@@ -37,7 +38,7 @@ MOST_BYTES = 16_000_000
 
 
 def node_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft) -> str | None:
-    """Return the only node that parameter files are written for, None otherwise."""
+    """Return the only node that the parameter files name; None if there are others or none."""
     files = [file for file in params if isinstance(file, str)]
     nodes = [node.name for file in files for node in _nodes_in(file, draft) or ()]
     names = {node.rpartition("/")[2] for node in nodes if "*" not in node}
@@ -49,15 +50,15 @@ def node_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft)
 class ImportedParams:
     """Parameters of a process in the form of a robot file."""
 
-    #: Parameter files, and the parameters that override them.
+    #: Parameter files, and parameters that override their values.
     common: dict[str, Any] = field(default_factory=dict)
     #: Parameters under the node's name, for a node that keeps its name.
-    own: dict[str, Any] = field(default_factory=dict)
+    of_node: dict[str, Any] = field(default_factory=dict)
     #: Arguments for parameters that a robot file has no key for.
     argv: list[str] = field(default_factory=list)
-    #: Descriptions of what is not imported.
+    #: Descriptions of parameters that are not imported.
     left: list[str] = field(default_factory=list)
-    #: The effective use_sim_time; None if nothing sets it.
+    #: The value of use_sim_time that the node gets; None if nothing sets it.
     clock: Any = None
 
 
@@ -66,10 +67,11 @@ def params_of(
 ) -> ImportedParams:
     """Return the parameters of a node.
 
-    rcl keeps sections in the order in which their names first appear, and of several sections for
-    a node the last one wins. launch itself passes parameters to a component one by one. A robot
-    file's inline parameters override those of its files, so only parameters that the files alone
-    do not give are inline. If a node ``keeps_name``, they apply to every node of the process.
+    rcl keeps sections in the order in which their names first appear. If several sections apply to
+    a node, the last section wins. For a component, launch passes each parameter separately. In a
+    robot file, inline parameters override the values of parameter files. Therefore a parameter is
+    inline only if the files do not already give its value. If ``keeps_name``, inline parameters
+    apply to every node of the process.
     """
     files: list[str] = []
     left = []
@@ -106,23 +108,25 @@ def params_of(
         common = _other_than(in_file, sections.get((_ANY, 0), {}))
         in_file |= common
     counting = _that_count(sections, full)
-    own = _other_than(_that_count(of_files, full), counting)
-    argv = _file_parameter(common) + _file_parameter(own)
+    node_params = _other_than(_that_count(of_files, full), counting)
+    argv = _file_parameter(common) + _file_parameter(node_params)
     if argv and program.plugin:
         left.append(f"the parameter {FILE_KEY}")
         argv = []
     named: dict[str, Any] = {FILE_KEY: files[0] if len(files) == 1 else files} if files else {}
-    common, own = (_values(common), _values(own)) if keeps_name else (_values(own), {})
+    common, node_params = (
+        (_values(common), _values(node_params)) if keeps_name else (_values(node_params), {})
+    )
     clock = value_in(counting.get("use_sim_time"))
-    return ImportedParams(named | common, own, argv, left, clock)
+    return ImportedParams(named | common, node_params, argv, left, clock)
 
 
-def _other_than(known: Mapping[str, Any], params: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in params.items() if value is not known.get(key)}
+def _other_than(excluded: Mapping[str, Any], params: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in params.items() if value is not excluded.get(key)}
 
 
 def _file_parameter(params: dict[str, Any]) -> list[str]:
-    """Take the parameter that has the name of the key for files; return it as arguments."""
+    """Remove the parameter with the same name as the key for files; return it as arguments."""
     if not isinstance(params.get(FILE_KEY), (str, list)):
         return []
     value = params.pop(FILE_KEY)
@@ -131,7 +135,7 @@ def _file_parameter(params: dict[str, Any]) -> list[str]:
 
 
 def bring_files(value: Any, draft: ImportDraft) -> Any:
-    """Return a text, with a generated file's path at its end replaced by the brought file's."""
+    """Replace the placeholder path at the end of a text by the path of the written file."""
     if isinstance(value, list):
         return [bring_files(item, draft) for item in value]
     made = next((path for path in draft.made if str(value).endswith(path)), None)
@@ -145,13 +149,13 @@ def _values(params: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _that_count(sections: _Sections, node: str) -> dict[str, Any]:
-    """Return the parameters that a node has of sections, which are by their names in order."""
+    """Return the parameters that a node gets from sections."""
     of_sections = (params for (name, _), params in sections.items() if matches(name, node))
     return {key: value for params in of_sections for key, value in params.items()}
 
 
 def value_in(value: Any) -> Any:
-    """Return a parameter's value, also if it is text from a file."""
+    """Return a parameter's value; parse it if it is the text of a file."""
     if isinstance(value, list):
         return list(map(value_in, value))
     if isinstance(value, Word):
@@ -168,9 +172,9 @@ def _by_full_name(params: Mapping[str, Any], above: str) -> Iterator[tuple[str, 
 
 
 def _nodes_in(file: str, draft: ImportDraft) -> list[NodeParams] | None:
-    """Return what a parameter file has for nodes, or None where it has nothing.
+    """Return the parameters of nodes in a parameter file.
 
-    None, too, if it is not there, or may not be read.
+    Return None if the file has none, does not exist, or may not be read.
     """
     try:
         text = draft.made.get(file) or draft.reach.read(file, MOST_BYTES).decode()

@@ -1,4 +1,4 @@
-"""An observed tree, live or from a bag, as a draft: edges, their nodes and rates."""
+"""Import of an observed tree, live or from a bag, into the draft of a robot file."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 #: Process that owns moving edges whose publisher is unknown, as in a bag.
 RECORDED = "recorded"
-#: The node of tfcompose's own that publishes fixed edges.
+#: The node of tfcompose that publishes fixed edges.
 STATIC = "tfcompose_static"
-#: A rate is taken for a rounder one that is so near.
+#: The largest relative difference at which a round rate replaces a measured rate.
 _NEAR = 0.03
 _PID = re.compile(r"as pid (\d+)")
 _STEPS = (1, 2, 2.5, 3, 4, 5, 6, 7.5, 8, 10)
@@ -42,9 +42,9 @@ class Observed:
     """Import of one observation into a draft."""
 
     draft: ImportDraft
-    #: Return the machine and process of a publisher, by its id.
+    #: A function that returns the machine and process of a publisher, by its id.
     where: Callable[[bytes | None], str]
-    #: Return the command line of a process on this machine; empty if it is unavailable.
+    #: A function that returns the command line of a process on this machine; empty if unknown.
     words_of: Callable[[int], Sequence[str]]
     #: The robot's namespace, without slashes.
     namespace: str = ""
@@ -65,7 +65,7 @@ class Observed:
                 publisher = edge.publisher or "another publisher"
                 self.draft.todo(f"{publisher} publishes {edge.name} as well", None, path)
             return
-        frames[edge.child] = {}  # its place is kept while its owner is named
+        frames[edge.child] = {}  # keep the position of the entry; the owner follows
         if stream.static:
             self._poses[edge.child] = stream.pose
         owner = None if stream.static and self._is_own(edge) else self._owner(edge)
@@ -87,9 +87,10 @@ class Observed:
         return len(edge.nodes) == 1 and edge.nodes[0] in {below + STATIC, below + STATE_PUBLISHER}
 
     def recognise(self, library: Library) -> None:
-        """Replace fixed frames with sensors whose presets describe them.
+        """Replace fixed frames by sensors, if presets describe the frames.
 
-        All driver frames of a sensor must have the same owner, and its other frames none.
+        All frames that the driver of a sensor publishes must have the same owner. The other frames
+        of the sensor must have no owner.
         """
         frames = self.draft.sections["frames"]
         for publisher in (DRIVER, TFCOMPOSE):
@@ -99,11 +100,11 @@ class Observed:
                 drivers = {owner for child, owner in owners.items() if child in sensor.sent} or {
                     None
                 }
-                others = {
+                other_owners = {
                     owner for child, owner in owners.items() if child not in sensor.sent
                 } or {None}
                 if (
-                    others == {None}
+                    other_owners == {None}
                     and len(drivers) == 1
                     and (drivers == {None}) is (publisher == TFCOMPOSE)
                 ):
@@ -113,7 +114,7 @@ class Observed:
                     self.draft.note(("frames", mount), note)
 
     def _fixed_frames(self) -> Robot:
-        """Return the fixed frames that are in the draft as a robot."""
+        """Return a robot with the fixed frames of the draft."""
         span, frames = Span(""), self.draft.sections["frames"]
         edges = tuple(
             Edge(
@@ -138,16 +139,18 @@ class Observed:
         )
 
     def _sensor(self, sensor: Recognised, driver: str) -> None:
-        """Put a sensor in the place of its frames.
+        """Replace the frames of a sensor by an entry for the sensor.
 
-        ``driver`` is the process that publishes those inside of it.
+        ``driver`` is the process that publishes the frames inside the sensor.
         """
         frames, mount = self.draft.sections["frames"], sensor.mount.child
         is_in_use = sensor.name in self.draft.sections["processes"]
         new = self._rename_process(sensor.name) if is_in_use else ""
-        own = {key: value for key, value in frames[mount].items() if key in {"owner", "static"}}
+        settings = {
+            key: value for key, value in frames[mount].items() if key in {"owner", "static"}
+        }
         pose = pose_keys(sensor.mount.pose, quaternion=True)
-        keys = sensor_keys(sensor, pose, {}, new if driver == sensor.name else driver) | own
+        keys = sensor_keys(sensor, pose, {}, new if driver == sensor.name else driver) | settings
         self.draft.sections["sensors"][sensor.name] = keys
         for edge in sensor.edges:
             self.draft.note(
@@ -157,7 +160,7 @@ class Observed:
             self.draft.brought.add(edge.child)
 
     def _rename_process(self, name: str) -> str:
-        """Give a process another name, which a sensor has: its driver is often called as it is."""
+        """Rename a process that has the same name as a sensor, as drivers often do."""
         sections, path = self.draft.sections, ("processes", name)
         node = next(node for node, process in self._owners.items() if process == name)
         new = self.draft.free_name(f"{name}_driver")
@@ -175,10 +178,10 @@ class Observed:
         return new
 
     def _owner(self, edge: EdgeState) -> str | None:
-        """Return the process of an edge's publisher.
+        """Return the process that publishes an edge, after adding it if necessary.
 
-        None for a fixed edge of an unknown node, which tfcompose can publish; an adopted robot
-        keeps that node.
+        Return None for a fixed edge of an unknown node, because tfcompose can publish the edge. If
+        the robot is adopted, its node keeps the edge.
         """
         if len(edge.nodes) != 1:
             for node in edge.nodes:
@@ -203,7 +206,10 @@ class Observed:
         return self._owners[node]
 
     def _stranger(self, what: str, edge: EdgeState) -> str:
-        """Return the process of a publisher without a node, which is ``what``: a DDS program."""
+        """Return the process of a publisher that is not a ROS node, such as a DDS program.
+
+        ``what`` describes the publisher.
+        """
         key = f"{what} {edge.stream.gid!r}"
         if key not in self._owners:
             notes = (f"it is {what}", *self._notes(edge))
@@ -239,7 +245,10 @@ _ANEW = (
 
 
 def _parents_first(edges: Sequence[EdgeState]) -> list[EdgeState]:
-    """Return the edges from the roots on; of several to one child the newest first."""
+    """Return the edges from the roots downwards.
+
+    If several edges lead to a child, the newest comes first.
+    """
     parents = {edge.child: edge.parent for edge in edges}
 
     def depth(frame: str) -> int:
@@ -254,9 +263,10 @@ def _parents_first(edges: Sequence[EdgeState]) -> list[EdgeState]:
 
 
 def round_rate(rate_hz: float | None) -> float | None:
-    """Return the probable nominal rate (Hz) for a measured one.
+    """Return the probable nominal rate for a measured rate, both in Hz.
 
-    A round rate near it, or one that is surely reached.
+    This is a round rate near the measured rate or, if there is none, a lower rate that the
+    publisher certainly reaches.
     """
     if not rate_hz or not math.isfinite(rate_hz) or rate_hz <= 0:
         return None
@@ -270,7 +280,8 @@ def round_rate(rate_hz: float | None) -> float | None:
 def parse_command_line(argv: Sequence[str]) -> dict[str, Any]:
     """Return the package, executable and arguments of a command line.
 
-    Empty if it runs no package's program. A Python package's program follows its interpreter.
+    Return an empty mapping if the program is not in a ROS package. In a command line that begins
+    with a Python interpreter, the program is the next argument.
     """
     rest = list(argv)
     if rest and posixpath.basename(rest[0]).startswith("python") and rest[1:]:
@@ -278,7 +289,7 @@ def parse_command_line(argv: Sequence[str]) -> dict[str, Any]:
     match = re.search(r"/lib/([^/]+)/([^/]+)$", rest[0]) if rest else None
     if match is None:
         return {}
-    own = rest[1 : rest.index("--ros-args")] if "--ros-args" in rest else rest[1:]
+    arguments = rest[1 : rest.index("--ros-args")] if "--ros-args" in rest else rest[1:]
     ros = rest[rest.index("--ros-args") :] if "--ros-args" in rest else []
     keys: dict[str, Any] = {"package": match[1], "executable": match[2]}
-    return keys | ({"args": [*own, *ros]} if own or ros else {})
+    return keys | ({"args": [*arguments, *ros]} if arguments or ros else {})

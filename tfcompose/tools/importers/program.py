@@ -1,4 +1,4 @@
-"""A program that a script or a launch file starts, in the source's terms."""
+"""Data of a program that a script or a launch file starts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Description:
     args: Mapping[str, str] = field(default_factory=dict)
     #: The text of a URDF.
     text: str = ""
-    #: Put in front of frame names (``frame_prefix``).
+    #: The prefix of frame names (``frame_prefix``).
     prefix: str = ""
     span: Span | None = None
 
@@ -40,11 +40,11 @@ class Program:
     executable: str | None = None
     #: The program's own arguments; without a package, the whole command.
     argv: tuple[str, ...] = ()
-    #: Whether ``argv`` is one text for a shell.
+    #: Whether ``argv`` is a single text for a shell.
     shell: bool = False
     name: str | None = None
     label: str | None = None
-    #: Absolute; None if the source sets none.
+    #: The absolute namespace; None if the source sets none.
     namespace: str | None = None
     #: Parameters and names of parameter files, in order. The last one wins.
     params: tuple[Mapping[str, Any] | str, ...] = ()
@@ -52,7 +52,7 @@ class Program:
     env: Mapping[str, str] = field(default_factory=dict)
     #: Further keys of the process, as in a robot file.
     keys: Mapping[str, Any] = field(default_factory=dict)
-    #: The delay after the start of the launch.
+    #: The delay after the start of the launch file, in seconds.
     period_s: float = 0.0
     reader: Reader | None = None
     description: Description | None = None
@@ -62,6 +62,6 @@ class Program:
     loads: bool = False
     #: The class of a component; empty for other programs.
     plugin: str = ""
-    #: Indices of ``params`` that are given under the node's full name. The others apply to every
-    #: node.
+    #: Indices of the ``params`` that the source passes under the node's full name. All other
+    #: parameters apply to every node.
     exact: range = range(0)

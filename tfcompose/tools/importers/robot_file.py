@@ -1,6 +1,7 @@
-"""The text of the robot file of an imported robot.
+"""Writer of the robot file for an imported URDF.
 
-Sections and keys are in the language's order. Comments note omissions at their places.
+Sections and keys have the order of the reference. A comment at an entry lists the parts of the
+source that the entry does not contain.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.compiler.urdf.blocks import with_hardware
 from tfcompose.foundation.yaml_text import comment, dedent_block, entry, section
 from tfcompose.tools.importers.draft import robot_name
-from tfcompose.tools.importers.omitted import (
+from tfcompose.tools.importers.sensors import recognise
+from tfcompose.tools.importers.unsupported import (
     angles,
     omitted_notes,
     with_material_names,
     without_unused_blocks,
 )
-from tfcompose.tools.importers.sensors import recognise
 from tfcompose.tools.importers.values import RobotFileValues, rotation
 from tfcompose.tools.importers.yaml_text import without_expressions
 
@@ -35,11 +36,12 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Robot
     from tfcompose.model.robot.hardware import Hardware, Interface
     from tfcompose.tools.importers.draft import ImportDraft
-    from tfcompose.tools.importers.omitted import Entry
     from tfcompose.tools.importers.sensors import Recognised
+    from tfcompose.tools.importers.unsupported import Entry
 
 
-#: Owner of planar and floating joints, whose publisher a URDF does not name.
+#: Name of the process that owns planar and floating joints, because a URDF does not name their
+#: publisher.
 MOVER = "mover"
 
 
@@ -53,18 +55,18 @@ class Imported:
     #: Path of the file to write.
     target: Target
     sensors: tuple[Recognised, ...] = ()
-    #: Comments by entry: what is left out, and why.
+    #: Comments by entry about omitted parts of the source, with the reasons.
     notes: Mapping[Entry, Iterable[str]] = field(default_factory=dict)
-    #: The source's roll, pitch and yaw (rad), by rotation.
+    #: The roll, pitch and yaw in the source (rad), by rotation.
     rpy: Mapping[Quaternion, Vector] = field(default_factory=dict)
-    #: Folders of packages, as the robot file names them.
+    #: Folders of packages, relative to the robot file.
     packages: Mapping[str, str] = field(default_factory=dict)
     #: Severities of findings that the source justifies, by code.
     rules: Mapping[str, str] = field(default_factory=dict)
 
 
 def robot_file(imported: Imported, head: Iterable[str]) -> str:
-    """Return the robot file of an imported robot; ``head`` are comments above everything."""
+    """Return the robot file of an imported robot; ``head`` are comments at its beginning."""
     return "\n".join([*_Writer(imported).lines(head), ""])
 
 
@@ -80,7 +82,10 @@ def put_into(draft: ImportDraft, imported: Imported) -> None:
 
 
 class _Writer:
-    """Writes one robot; each section is a mapping, in the order of the source."""
+    """Makes the sections of a robot file from a robot.
+
+    Entries of a section have the order of the source.
+    """
 
     def __init__(self, imported: Imported) -> None:
         self.imported, self.robot = imported, imported.robot
@@ -92,7 +97,10 @@ class _Writer:
         self.fixed = self._fixed_edges()
 
     def sections(self) -> dict[str, dict[str, Any]]:
-        """Return the sections in the order of the language; ``notes`` are complete then."""
+        """Return the sections in the order of the reference.
+
+        After this call, ``notes`` are complete.
+        """
         imported, robot, links, joints = self.imported, self.robot, self._links(), self._joints()
         return {
             "packages": dict(imported.packages),
@@ -131,26 +139,26 @@ class _Writer:
         return self.notes.get((title, name), [])
 
     def _homeless(self, sections: dict[str, dict[str, Any]]) -> list[str]:
-        """Return the notes of what has no entry of its own.
+        """Return the notes that belong to no entry.
 
-        A frame with a body has its notes there.
+        The notes of a frame with a body are at its link.
         """
-        homeless = []
+        unplaced = []
         for (title, name), notes in list(self.notes.items()):
             if title == "frames" and name not in sections["frames"] and name in sections["links"]:
                 self.notes["links", name] = self._of("links", name) + notes
             elif title and name not in sections[title]:
-                homeless += [f"{name}: {note}" for note in notes]
-        return homeless
+                unplaced += [f"{name}: {note}" for note in notes]
+        return unplaced
 
     def _note(self, title: str, name: str, *notes: str) -> None:
         if notes:
             self.notes.setdefault((title, name), []).extend(notes)
 
     def _fixed_edges(self) -> dict[str, Edge]:
-        """Return the edges that do not move and are no sensor's, by child.
+        """Return the fixed edges that do not belong to a sensor, by child.
 
-        Of several to one child, the first.
+        If several edges lead to a child, return the first.
         """
         fixed: dict[str, Edge] = {}
         for edge in self.robot.edges:
@@ -164,7 +172,7 @@ class _Writer:
         return bool(link.visuals or link.collisions or link.inertial)
 
     def base(self) -> str | None:
-        """Return the base, if it is not what a robot file without one has."""
+        """Return the base frame, if it is not the default of a robot file."""
         roots = self.robot.roots()
         root = roots[0] if len(roots) == 1 else None
         above = self.robot.parent_edge("base_link") if "base_link" in self.robot.frames else None
@@ -202,7 +210,7 @@ class _Writer:
         return joints
 
     def _mount(self, edge: Edge, title: str = "frames") -> dict[str, Any]:
-        """Return the keys of a fixed edge, which stand at its child."""
+        """Return the keys of a fixed edge for the entry of its child."""
         self._note(title, edge.child, *self.notes.pop(("joints", edge.joint_name), ()))
         return {"parent": edge.parent, **self.values.pose(edge.pose), **_joint_name(edge)}
 
@@ -231,8 +239,9 @@ def sensor_keys(
 ) -> dict[str, Any]:
     """Return the keys of a sensor.
 
-    ``pose`` are those of its mount, ``rpy`` the source's angles of rotations. ``driver`` is the
-    process that publishes its inner frames, empty if tfcompose does.
+    ``pose`` contains the keys of the mount's pose. ``rpy`` contains the source's angles, by
+    rotation. ``driver`` is the process that publishes the frames inside the sensor; empty if
+    tfcompose publishes them.
     """
     frames: dict[str, Any] = {}
     mount = sensor.mount.child
@@ -262,7 +271,7 @@ def sensor_keys(
 
 
 def _joint_name(edge: Edge) -> dict[str, str]:
-    """Return the joint name of a fixed edge, if ``build`` names it otherwise."""
+    """Return the joint name of a fixed edge, if ``build`` would write another name."""
     return (
         {"joint": edge.joint_name}
         if edge.joint_name not in {"", f"{edge.parent}_to_{edge.child}"}
@@ -301,7 +310,7 @@ def _params(params: dict[str, str]) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """Return the text as a number or a truth where that comes out as the same text again."""
+    """Return the number or bool that a text represents, if it is written as the same text."""
     if text in {"true", "false"}:
         return text == "true"
     if re.fullmatch(r"-?(0|[1-9][0-9]{0,14})(\.[0-9]*[1-9])?", text) and text != "-0":
@@ -319,8 +328,9 @@ def import_document(
 ) -> Imported:
     """Return the robot file's contents for the document, for a file at the target.
 
-    If ``name`` is empty, the source's is used. ``packages`` are the folders of packages that are
-    not installed. Sensors are recognised with the ``library``, if there is one.
+    If ``name`` is empty, the robot keeps the source's name. ``packages`` are the folders of
+    packages that are not installed. If there is a ``library``, its presets replace frames by
+    sensors.
     """
     robot, unused = without_unused_blocks(with_hardware(document.robot))
     robot, renamed = with_material_names(robot)
@@ -346,7 +356,7 @@ def import_document(
 def with_findings(
     robot: Imported, source: str, lint: Callable[[str], Compiled]
 ) -> tuple[str, list[Finding]]:
-    """Return the robot file with lint's findings as comments, and its own errors.
+    """Return the robot file with lint's findings as comments, and the remaining errors.
 
     ``source`` is the imported file. Names from the source are not errors.
     """
@@ -360,7 +370,7 @@ def with_findings(
 
 
 def _faults(compiled: Compiled) -> Iterable[str]:
-    """Yield what lint finds in the result, each rule once: these are faults of the source."""
+    """Yield lint's findings about the robot file, each code once: faults of the source."""
     by_code: dict[str, list[Finding]] = {}
     for finding in compiled.findings:
         by_code.setdefault(finding.code, []).append(finding)

@@ -1,4 +1,4 @@
-"""Settings that a source gives each program, as the robot's: clock, namespace, domain."""
+"""Settings of all programs that become settings of the robot: clock, namespace and domain."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ SEVERAL = "several robots are parts, each with its namespace, or a fleet: import
 
 
 def one_clock(draft: ImportDraft) -> None:
-    """Set the robot's clock from node parameters or their argument, if all agree.
+    """Set the robot's clock from the nodes' use_sim_time.
 
-    Parameter files count, too.
+    All nodes that set use_sim_time must set it to true or to the same argument. Values in
+    parameter files count too.
     """
     clocks = [clock for _, clock, _ in draft.clocks if clock is not None]
     arguments = {argument_of(clock) for clock in clocks}
@@ -40,7 +41,7 @@ def one_clock(draft: ImportDraft) -> None:
 
 
 def _without_clock(draft: ImportDraft) -> None:
-    """Leave the clock to the robot, but where a parameter file has one too."""
+    """Remove use_sim_time from nodes, unless a parameter file also sets it."""
     for keys in draft.started_entries().values():
         params = keys.get("params", {})
         if FILE_KEY not in params and params.pop("use_sim_time", None) and not params:
@@ -48,7 +49,7 @@ def _without_clock(draft: ImportDraft) -> None:
 
 
 def _name_clockless(draft: ImportDraft) -> None:
-    """Say which nodes have no clock in the source: here they have the robot's."""
+    """Note the nodes that set no clock in the source, because they now get the robot's clock."""
     nodes = {
         name: span
         for name, clock, span in draft.clocks
@@ -60,27 +61,29 @@ def _name_clockless(draft: ImportDraft) -> None:
 
 
 def _takes_settings(run: Any) -> bool:
-    """Return whether what a process runs is given the robot's settings as ROS arguments."""
+    """Return whether tfcompose passes the robot's settings to a process as ROS arguments."""
     return isinstance(run, dict) and "launch" not in run
 
 
 def is_setting(draft: ImportDraft, name: str, value: str) -> bool:
-    """Return whether a variable is a robot-wide setting, and if so, set it on the robot.
+    """If a variable is a setting of the whole robot, set it on the robot and return True.
 
-    The first value wins.
+    If the source sets several values, the first value wins.
     """
     if name not in _SETTINGS:
         return False
-    known = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
-    wanted = known[_SETTINGS[name]]
+    settings = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
+    setting = settings[_SETTINGS[name]]
     allowed = (
-        wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
+        setting in {"localhost", "subnet", "off"}
+        if name != "ROS_DOMAIN_ID"
+        else setting is not None
     )
-    return allowed and draft.sections["ros"].setdefault(_SETTINGS[name], wanted) == wanted
+    return allowed and draft.sections["ros"].setdefault(_SETTINGS[name], setting) == setting
 
 
 def is_isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | None) -> bool:
-    """Return whether remappings leave TF unchanged, or move it below the draft's namespace."""
+    """Return whether remappings keep TF on its topics or move it below the draft's namespace."""
     new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
     if any(name != topic.strip("/") for topic, name in new.items()):
         return False
@@ -94,7 +97,7 @@ def is_isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | N
 
 
 def one_namespace(draft: ImportDraft) -> None:
-    """Rewrite namespaces relative to the robot's if they are below it, else as absolute."""
+    """Make namespaces below the robot's namespace relative, and all others absolute."""
     ros = draft.sections["ros"]
     space = ros.get("namespace")
     if not space:
@@ -102,13 +105,13 @@ def one_namespace(draft: ImportDraft) -> None:
     for name, keys in draft.started_entries().items():
         if name in BUILT_IN:
             continue
-        own = keys.pop("namespace", "")
-        if not own and not isinstance(keys.get("run", {}), dict):
-            continue  # a command is given no namespace
-        if own.startswith(f"{space}/"):
-            keys["namespace"] = own[len(space) + 1 :]
-        elif own != space:
-            keys["namespace"] = concatenate(["/", own])
+        namespace = keys.pop("namespace", "")
+        if not namespace and not isinstance(keys.get("run", {}), dict):
+            continue  # tfcompose passes no namespace to a command
+        if namespace.startswith(f"{space}/"):
+            keys["namespace"] = namespace[len(space) + 1 :]
+        elif namespace != space:
+            keys["namespace"] = concatenate(["/", namespace])
             if ros.get("isolate"):
                 message = f"{name} is not in {space}: its /tf is the robot's, {space}/tf"
                 draft.todo(message, None, draft.entry_of(name), SEVERAL)

@@ -1,9 +1,11 @@
-"""Sensors in a URDF: chains of fixed frames with the names and poses of a preset.
+"""Recognition of sensors in a URDF by the names and poses of fixed frames.
 
-At least one inner frame identifies a preset: its position is the vendor's and not 0. If frames
-have other names, a frame or mesh name must contain the model's name as well. If several presets
-fit equally well, the generic one is used, or the one whose model is named. Otherwise none is used,
-and a note asks which it is, as it does if only a vendor's name was found.
+A preset fits if the robot has its frames at the preset's poses. At least one of these frames,
+inside the sensor, must have a position other than 0 that the vendor states. If the frames have
+other names than in the preset, the name of a frame or mesh must also contain the model's name. If
+several presets fit equally well, the generic preset is used, or the preset whose model is named.
+If this does not decide, no preset is used, and a note in the robot file asks for the model. The
+same note appears if only a vendor's name is found.
 """
 
 from __future__ import annotations
@@ -32,15 +34,16 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Robot
     from tfcompose.spec.language.preset import PresetFrame, PresetSpec
 
-#: As near as a pose must be to a preset's to be taken for it: rotations are often written with
-#: -1.57.
+#: The largest distances, in m and rad, at which a pose matches a preset's pose. The angle is
+#: larger than rounding errors, because URDFs often contain -1.57.
 NEAR, NEAR_RAD = 1e-6, 2e-3
-#: As near as it must be to be left to the preset.
+#: The largest difference at which the robot file omits the pose, because the preset has it.
 EQUAL = 1e-13
-#: As far as a nominal frame of a device that was calibrated may be from it, where the driver
-#: publishes it.
+#: The largest distances, in m and rad, at which a frame matches a nominal pose, if a driver
+#: publishes the frame with the calibration of its device.
 CALIBRATED, CALIBRATED_RAD = 0.02, 0.06
-#: Every camera has frames that are turned as optical ones are: that alone names no vendor.
+#: The vendor of generic presets. They do not identify a vendor, because every camera has optical
+#: frames.
 GENERIC = "generic"
 _MOST_CHOICES = 256
 _MOST_NAMED = 8
@@ -78,29 +81,29 @@ class Recognised:
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """One way in which a preset fits."""
+    """A match of a preset with frames of the robot."""
 
     sensor: Recognised
-    #: The number of options that have their defaults.
+    #: The number of options with default values.
     usual: int
 
     @property
     def quality(self) -> tuple[int, int, int, int]:
-        """How well a preset fits: frames, names and values to the last digit, defaults."""
-        own = len(self.sensor.own_xyz) + len(self.sensor.own_rotation)
-        return (len(self.sensor.inside), -len(self.sensor.names), -own, self.usual)
+        """The numbers of frames, equal names, exact values and defaults, to compare matches."""
+        count = len(self.sensor.own_xyz) + len(self.sensor.own_rotation)
+        return (len(self.sensor.inside), -len(self.sensor.names), -count, self.usual)
 
 
 @dataclass(frozen=True, slots=True)
 class _FrameMatch:
-    """A preset's frame found in the robot."""
+    """A frame of the robot that matches a frame of a preset."""
 
     edge: Edge
     #: Whether the position differs from the preset's.
     own_xyz: bool
     #: Whether the rotation differs from the preset's.
     own_rotation: bool
-    #: Whether the pose identifies the sensor: few other sensors have it.
+    #: Whether the pose identifies the sensor, because few other sensors have such a pose.
     tells: bool
 
 
@@ -109,7 +112,8 @@ def recognise(
 ) -> tuple[list[Recognised], dict[str, str]]:
     """Return the sensors, and a note for each undecided mount.
 
-    ``publisher``: look for frames as tfcompose publishes them, or as drivers do.
+    ``publisher`` is tfcompose or the driver. It decides if the frames of a preset have their
+    nominal poses or the poses that the driver publishes.
     """
     search = _Search(robot, library, publisher)
     fits = sorted(search.fits(), key=lambda fit: fit.quality, reverse=True)
@@ -157,14 +161,14 @@ _MOUNTS = re.compile(r"(?<=.)_(?:(?:base|camera|mount)_)?(?:link|frame|mount|bas
 
 
 def _sensor_name(mount: str) -> str:
-    """Return what a sensor is called whose mount is not called as its preset has it."""
+    """Return a name for a sensor from the name of its mount, if this has no name of the preset."""
     return re.sub(r"\W+", "_", _MOUNTS.sub("", mount)).strip("_") or "sensor"
 
 
 def _words(*texts: str) -> frozenset[str]:
-    """Return the words of some names, each also joined to its neighbours.
+    """Return the words in some names, and each word joined to its neighbours.
 
-    Of ``VLP-16_base`` also ``vlp16``.
+    For ``VLP-16_base``, one of them is ``vlp16``.
     """
     joined: set[str] = set()
     for text in texts:
@@ -194,17 +198,20 @@ class _Search:
             self._children.setdefault(edge.parent, []).append(edge)
 
     def fits(self) -> Iterator[_Fit]:
-        """Yield every way in which a preset fits somewhere."""
+        """Yield every match of a preset with frames of the robot."""
         for name in self.library.names:
             try:
                 plain = self.library.get(name)
                 for choices in _choices(plain):
                     yield from self._of_preset(name, self.library.get(name, choices), choices)
             except RejectedError:
-                continue  # lint reports what is wrong with it
+                continue  # lint reports the error in the preset
 
     def choose(self, rivals: list[_Fit]) -> Recognised | None:
-        """Return the equally good fit that other facts single out, or None."""
+        """Choose among equally good matches by names of models.
+
+        If names do not decide, return a generic preset's match, or None.
+        """
         rivals = [rival for rival in rivals if not self.other_model(rival.sensor)]
         if not rivals:
             return None
@@ -220,20 +227,19 @@ class _Search:
         ]
         longest = max(
             (len(_model(candidate.preset)) for candidate in named), default=0
-        )  # of oak-d and oak-d-pro, the longer one
+        )  # if both oak-d and oak-d-pro are named, the longer name
         named = [candidate for candidate in named if len(_model(candidate.preset)) == longest]
         if len({candidate.preset for candidate in named}) == 1:
             return named[0]
         return generic[0] if generic and not named else None
 
     def edges_naming_presets(self) -> list[tuple[Edge, list[str]]]:
-        """Return the edges whose frame, or a mesh on it, names presets, with these.
+        """Return the edges whose frame or mesh has a preset's name, with the names of the presets.
 
-        The most exact names first.
-
-        It may be a model, or else a family, or else a vendor.
+        The most exact names come first. A name is a model or, if there is none, a family or a
+        vendor.
         """
-        found: list[tuple[int, Edge, list[str]]] = []
+        matches: list[tuple[int, Edge, list[str]]] = []
         for rank, naming in enumerate((_model, _family, _vendor)):
             presets: dict[str, list[str]] = {}
             for name in self.library.names:
@@ -243,13 +249,13 @@ class _Search:
                     (self._words_of(edge.child) & presets.keys()) - {""}, key=len, default=""
                 )
                 if token:
-                    found.append((100 * rank - len(token), edge, presets[token]))
-        return [(edge, presets) for _, edge, presets in sorted(found, key=itemgetter(0))]
+                    matches.append((100 * rank - len(token), edge, presets[token]))
+        return [(edge, presets) for _, edge, presets in sorted(matches, key=itemgetter(0))]
 
     def other_model(self, sensor: Recognised) -> list[str]:
-        """Return the presets named at the frames, if none of them is the sensor's.
+        """Return the presets that names of frames and meshes contain, if the sensor's is not one.
 
-        The mesh of a D435i may be that of a D435.
+        A D435i may have the mesh of a D435.
         """
         tokens = frozenset().union(*(self._words_of(edge.child) for edge in sensor.edges))
         named = {name: model for name in self.library.names if (model := _model(name)) in tokens}
@@ -259,26 +265,26 @@ class _Search:
             for more in named.values()
             if more.startswith(model) and more != model
         }
-        exact = {*named.values()} - parts  # of zedx and zedxone4k, the latter
-        own = _model(sensor.preset)
-        if not own or any(own.startswith(name) for name in exact):
+        exact = {*named.values()} - parts  # if both zedx and zedxone4k are named, the latter
+        model_of_sensor = _model(sensor.preset)
+        if not model_of_sensor or any(model_of_sensor.startswith(name) for name in exact):
             return []
         return [name for name, model in named.items() if model in exact]
 
     def above(self, frame: str) -> Iterator[str]:
-        """Yield the frames that a frame is fixed to, the nearest first."""
-        known = {frame}
-        while frame in self.edges and (frame := self.edges[frame].parent) not in known:
-            known.add(frame)
+        """Yield the frames above a frame that are fixed to it, the nearest first."""
+        frames = {frame}
+        while frame in self.edges and (frame := self.edges[frame].parent) not in frames:
+            frames.add(frame)
             yield frame
 
     def below(self, frame: str) -> Iterator[str]:
-        """Yield the frames that are fixed to a frame, and to these."""
-        waiting, known = [frame], {frame}
+        """Yield all frames below a frame that are fixed to it."""
+        waiting, visited = [frame], {frame}
         while waiting:
             for edge in self._children.get(waiting.pop(), ()):
-                if edge.child not in known:
-                    known.add(edge.child)
+                if edge.child not in visited:
+                    visited.add(edge.child)
                     waiting.append(edge.child)
                     yield edge.child
 
@@ -286,7 +292,7 @@ class _Search:
         return any(_model(preset) in self._words_of(edge.child) for edge in edges)
 
     def _words_of(self, frame: str) -> frozenset[str]:
-        """Return the words of a frame's name and of the files on it."""
+        """Return the words in the name of a frame and in the names of its meshes."""
         if frame not in self._words_at:
             link = self.robot.links.get(frame)
             shapes = (*link.visuals, *link.collisions) if link else ()
@@ -324,17 +330,21 @@ class _Search:
         own_mount = fill_name(preset.mount, sensor, preset.words)
         for options in _options(preset):
             every = dict(choices) | options
-            wanted = {
+            preset_frames = {
                 key: self._as_sent(frame)
                 for key, frame in preset.frames.items()
                 if holds(frame.when, every, self.publisher)
             }
-            if self.publisher == DRIVER and not any(frame.driver for frame in wanted.values()):
+            if self.publisher == DRIVER and not any(
+                frame.driver for frame in preset_frames.values()
+            ):
                 continue
             names = {own_mount: mount.child} if has_own_names else {}
-            found = self._match_frames(preset, sensor, wanted, names, has_own_names=has_own_names)
-            inside = found.values()
-            if len(found) < len(wanted) or not any(match.tells for match in inside):
+            matches = self._match_frames(
+                preset, sensor, preset_frames, names, has_own_names=has_own_names
+            )
+            inside = matches.values()
+            if len(matches) < len(preset_frames) or not any(match.tells for match in inside):
                 continue
             changed_options = {
                 key: value for key, value in every.items() if value != preset.options[key].default
@@ -353,54 +363,62 @@ class _Search:
                     ),
                     body=names.get(body, body),
                     driven=preset.driver is not None,
-                    names={there: own for own, there in names.items() if there != own},
+                    names={
+                        preset_name: name
+                        for name, preset_name in names.items()
+                        if preset_name != name
+                    },
                     sent=frozenset(
-                        match.edge.child for key, match in found.items() if wanted[key].driver
+                        match.edge.child
+                        for key, match in matches.items()
+                        if preset_frames[key].driver
                     ),
                 ),
                 len(every) - len(changed_options),
             )
 
     def _as_sent(self, frame: PresetFrame) -> PresetFrame:
-        """Return the frame as its publisher sends it.
+        """Return a preset's frame with the parent and the pose that its publisher sends.
 
-        A driver may have another parent or pose for it.
+        A driver may send another parent or pose.
         """
         if self.publisher != DRIVER or frame.by_driver is None:
             return frame
-        own = frame.by_driver
+        by_driver = frame.by_driver
         turned = (
-            {key: getattr(own, key) for key in ROTATIONS} if rotation_of(own) is not None else {}
+            {key: getattr(by_driver, key) for key in ROTATIONS}
+            if rotation_of(by_driver) is not None
+            else {}
         )
-        at = {"xyz": own.xyz} if own.xyz is not None else {}
-        return frame.model_copy(update={"parent": own.parent, **at, **turned})
+        position = {"xyz": by_driver.xyz} if by_driver.xyz is not None else {}
+        return frame.model_copy(update={"parent": by_driver.parent, **position, **turned})
 
     def _match_frames(
         self,
         preset: PresetSpec,
         sensor: str,
-        wanted: Mapping[str, PresetFrame],
+        preset_frames: Mapping[str, PresetFrame],
         names: dict[str, str],
         *,
         has_own_names: bool,
     ) -> dict[str, _FrameMatch]:
-        """Return where the robot has the preset's frames.
+        """Return the robot's frames that match the preset's frames.
 
-        ``names`` gets those that they have in the robot.
+        The names of these frames in the robot are added to ``names``.
         """
-        found: dict[str, _FrameMatch] = {}
-        waiting = dict(wanted)
+        matches: dict[str, _FrameMatch] = {}
+        waiting = dict(preset_frames)
         while waiting:
             ready = [key for key, match in waiting.items() if match.parent not in waiting]
             for key in ready or list(waiting):
                 frame = waiting.pop(key)
-                own, parent = (
+                name, parent = (
                     fill_name(key, sensor, preset.words),
                     fill_name(frame.parent, sensor, preset.words),
                 )
-                edges = [self.edges[own]] if own in self.edges else []
+                edges = [self.edges[name]] if name in self.edges else []
                 if has_own_names:
-                    edges = self._by_likeness(own, names.get(parent, parent), set(names.values()))
+                    edges = self._by_likeness(name, names.get(parent, parent), set(names.values()))
                 edges = [edge for edge in edges if edge.parent == names.get(parent, parent)]
                 match = next(
                     (match for edge in edges if (match := self._match(preset, edge, key, frame))),
@@ -408,12 +426,12 @@ class _Search:
                 )
                 if match is None:
                     return {}
-                found[key] = match
-                names[own] = match.edge.child
-        return found
+                matches[key] = match
+                names[name] = match.edge.child
+        return matches
 
     def _by_likeness(self, name: str, parent: str, used_frames: set[str]) -> list[Edge]:
-        """Return the edges from a parent, those to frames of the most similar names first."""
+        """Return the edges from a parent; frames with the most similar names come first."""
         edges = [edge for edge in self._children.get(parent, ()) if edge.child not in used_frames]
         return sorted(
             edges, key=lambda edge: -difflib.SequenceMatcher(None, name, edge.child).ratio()
@@ -422,7 +440,7 @@ class _Search:
     def _match(
         self, preset: PresetSpec, edge: Edge, pattern: str, frame: PresetFrame
     ) -> _FrameMatch | None:
-        """Return the edge as that of a preset's frame, or None where it is another one."""
+        """Return the match of an edge with a preset's frame, or None if they do not match."""
         rotation = rotation_of(frame, pattern)
         unknown = frame.xyz is None and rotation is None
         nominal = Pose(
@@ -443,13 +461,13 @@ class _Search:
         return _FrameMatch(edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, tells)
 
 
-#: Kinds of sensors, which name no model.
+#: Kinds of sensors. Such a word in a name does not identify a model.
 _KINDS = frozenset(get_args(SensorKind))
 _SHORTEST = 3
 
 
 def _naming(text: str, preset: str) -> str:
-    """Return the words as one that names a preset, or nothing where they may be about anything."""
+    """Return the text as a single word that can identify a preset; empty if it is too general."""
     compact = re.sub("[^a-z0-9]", "", text.lower())
     return (
         ""
@@ -472,7 +490,7 @@ def _vendor(preset: str) -> str:
 
 
 def _choices(preset: PresetSpec) -> Iterator[dict[str, str]]:
-    """Yield the values that the preset's choices can have."""
+    """Yield each combination of values of the preset's choices."""
     choices = {
         key: list(option.variants)
         for key, option in preset.options.items()
@@ -483,7 +501,7 @@ def _choices(preset: PresetSpec) -> Iterator[dict[str, str]]:
 
 
 def _options(preset: PresetSpec) -> Iterator[dict[str, Any]]:
-    """Yield the values of other options that change the frames."""
+    """Yield each combination of values of other options that change the frames."""
     used = {option for frame in preset.frames.values() for option in frame.when}
     options: dict[str, list[Any]] = {}
     for key, option in preset.options.items():

@@ -1,7 +1,8 @@
-"""Commands in a shell script, or in lines of a terminal, as far as they need no shell.
+"""Import of the commands in a shell script, or in lines copied from a terminal.
 
-Words are split as in a POSIX shell. Variables that the script sets to plain texts are filled in.
-Anything that only a shell can evaluate, such as ``$(…)`` and arithmetic, is not guessed.
+The reader splits words as a POSIX shell does. It replaces variables that the script sets to plain
+texts. It does not evaluate anything that needs a shell, such as ``$(…)`` and arithmetic; the
+import reports these parts.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.tools.importers.command_lines import BEFORE
+from tfcompose.tools.importers.executables import add_program
 from tfcompose.tools.importers.program import Program
-from tfcompose.tools.importers.programs import add_program
 from tfcompose.tools.importers.robot_settings import is_setting, one_clock, one_namespace
 from tfcompose.tools.importers.static_transforms import PROGRAM
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ASSIGNMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)=(.*)", re.DOTALL)
-#: Commands that prepare a shell or print something, and start nothing of a robot.
+#: Commands that prepare a shell or print a text, but start no process of a robot.
 _OF_SHELL = frozenset(
     {
         "source",
@@ -58,7 +59,7 @@ _OF_SHELL = frozenset(
         "tfcompose",
     }
 )
-#: Commands that change files or end processes; only the robot's owner knows whether it needs them.
+#: Commands that change files or end processes. Only the user knows if the robot needs them.
 _ONCE = frozenset(
     {"mkdir", "cp", "mv", "rm", "ln", "touch", "chmod", "chown", "kill", "pkill", "killall", "git"}
 )
@@ -71,7 +72,8 @@ _TIME = re.compile(r"\d{1,4}[-/.]\d\d?[-/.]\d{1,4}|\d\d?:\d\d(:\d\d)?")
 _OF_ROS = re.compile(
     r"\b(ros2|rosrun|roslaunch|static_transform_publisher|robot_state_publisher|roscore)\b"
 )
-#: Programs that start another one, which is all that counts here: its output is in its log.
+#: Terminals, which start another program. The robot file starts only that program, because its
+#: output goes to its log.
 _TERMINALS = frozenset(
     {
         "xterm",
@@ -84,7 +86,7 @@ _TERMINALS = frozenset(
     }
 )
 _SHELLS = frozenset({"bash", "sh", "zsh", "dash"})
-#: Programs that start another one in some way, which ``prefix`` keeps.
+#: Programs that start another program with other settings. They become ``prefix``.
 _PREFIXES = frozenset(
     {
         "nice",
@@ -134,9 +136,9 @@ _CONTROL = frozenset(
         "test",
     }
 )
-#: Words that end what another one begins.
+#: Words that end a block of a script.
 _ENDS = frozenset({"fi", "done", "esac", "}", ")"})
-#: Words that control the flow and have a command behind them.
+#: Words of control flow that a command follows.
 _LEADING = frozenset({"then", "else", "do", "{", "(", "!"})
 
 
@@ -144,12 +146,12 @@ _LEADING = frozenset({"then", "else", "do", "{", "(", "!"})
 class ShellCommand:
     """A simple command of a script."""
 
-    #: Quotes are removed.
+    #: The words of the command, without quotes.
     words: tuple[str, ...]
-    #: As written.
+    #: The command as it is in the script.
     text: str
     line: int
-    #: Parts of the words that only a shell can evaluate.
+    #: Parts of the command that only a shell can evaluate.
     unknown: tuple[str, ...] = ()
     #: Whether the command is part of a pipe.
     piped: bool = False
@@ -164,7 +166,10 @@ class _ShellReader:
         self.variables: dict[str, str] = {}
 
     def commands(self) -> Iterator[ShellCommand]:
-        """Yield the commands in order; variables are as they are where each one stands."""
+        """Yield the commands in order.
+
+        A command has the values that its variables have at its line.
+        """
         piped = False
         while self.at < len(self.text):
             begin, line = self.at, self.line
@@ -181,7 +186,7 @@ class _ShellReader:
                 )
 
     def _words(self) -> tuple[list[str], list[str], str]:
-        """Return the words until a command ends, what is unknown of them, and what ended it."""
+        """Return a command's words, their parts that need a shell, and the command's end mark."""
         argv: list[str] = []
         unknown: list[str] = []
         token: str | None = None
@@ -213,7 +218,7 @@ class _ShellReader:
         return [*argv, *([token] if token is not None else [])], unknown, ""
 
     def _is_redirection(self) -> bool:
-        """Return whether a & belongs to ``2>&1`` or ``&>``."""
+        """Return whether the next ``&`` belongs to ``2>&1`` or ``&>``."""
         before, behind = self.text[self.at - 1 : self.at], self.text[self.at + 1 : self.at + 2]
         return self.text[self.at] == "&" and (before in {">", "<"} or behind == ">")
 
@@ -290,13 +295,13 @@ class _ShellReader:
 
 
 def _first_word(text: str) -> int:
-    """Return where the first word begins, behind blank lines and comments."""
+    """Return the index of the first word after blank lines and comments."""
     match = re.match(r"(?:\s|#[^\n]*\n|\\\n)*", text)
     return match.end() if match else 0
 
 
 def _closing(text: str) -> int:
-    """Return the length of ``$(…)`` at the beginning of a text."""
+    """Return the length of the ``$(…)`` with which a text begins."""
     depth = 0
     for index, char in enumerate(text):
         depth += (char == "(") - (char == ")")
@@ -358,7 +363,7 @@ class _Script:
             self._todo(command, "it opens files, and starts nothing")
 
     def _add(self, command: ShellCommand, argv: list[str], variables_set: dict[str, str]) -> None:
-        """Add a command, or what it starts in a shell, in a terminal or behind a prefix."""
+        """Add the program of a command, also in a shell, in a terminal or after a prefix."""
         if argv[0] in _TERMINALS | _SHELLS and "-c" in argv[:-1]:
             text = argv[argv.index("-c") + 1]
             if _OF_ROS.search(text):
@@ -420,7 +425,7 @@ def _without_prompt(argv: list[str]) -> list[str]:
 
 
 def _program_at(argv: list[str]) -> int:
-    """Return where in a command its ROS program begins, 0 for other commands."""
+    """Return the index at which the ROS program of a command begins; 0 for other commands."""
     for index, argument in enumerate(argv):
         if argument in {"rosrun", "roslaunch"} or (
             argument == "ros2" and argv[index + 1 : index + 2] in (["run"], ["launch"])
@@ -432,7 +437,7 @@ def _program_at(argv: list[str]) -> int:
 
 
 def _assignments(argv: list[str]) -> tuple[dict[str, str], list[str]]:
-    """Return the variables that are set in front of a command, and the command."""
+    """Split a command into the variables that it sets and the command itself."""
     variables_set: dict[str, str] = {}
     for index, argument in enumerate(argv):
         match = _ASSIGNMENT.fullmatch(argument)
@@ -459,8 +464,8 @@ def add_script(draft: ImportDraft, text: str, file: str, target: Target) -> None
     """Add the programs that a script starts to the draft.
 
     Raises:
-        RejectedError: if it is no script by its name or first line, and nothing of ROS stands in
-            it.
+        RejectedError: if neither the name nor the first line is that of a script, and no line is
+        about ROS.
     """
     if not (
         file.endswith((".sh", ".bash"))

@@ -1,8 +1,8 @@
-"""Arguments of ``static_transform_publisher``: named or positional in ROS 2, positional in ROS 1.
+"""Arguments of the ``static_transform_publisher`` of ROS 1 and ROS 2.
 
-Source: geometry2 (``static_transform_broadcaster_program.cpp``) and ROS 1's ``tf`` and
-``tf2_ros``. All orders have yaw first, all angles are radians about fixed axes, and nothing is
-normalised.
+ROS 2 has named and positional arguments, ROS 1 only positional arguments. In all of them, yaw
+comes first, angles are in radians about fixed axes, and quaternions are not normalised. Source:
+``static_transform_broadcaster_program.cpp`` of geometry2, and ``tf`` and ``tf2_ros`` of ROS 1.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
 
 PROGRAM = "static_transform_publisher"
-#: The same as a component, which has the values as parameters.
+#: The class of the same node as a component. It gets the transform as parameters.
 PLUGIN = "tf2_ros::StaticTransformBroadcasterNode"
 _PARAMETERS = {
     **{f"translation.{axis}": f"--{axis}" for axis in "xyz"},
@@ -29,7 +29,7 @@ _PARAMETERS = {
     "child_frame_id": "--child-frame-id",
 }
 
-#: Program that reads the arguments: that of ROS 2, of ROS 1's tf, or of ROS 1's tf2_ros.
+#: The program that reads the arguments: of ROS 2, of ROS 1's tf, or of ROS 1's tf2_ros.
 Reader = Literal["ros2", "tf", "tf2_ros"]
 
 _POSITION = ("--x", "--y", "--z")
@@ -37,15 +37,15 @@ _QUATERNION = ("--qx", "--qy", "--qz", "--qw")
 _ANGLES = ("--roll", "--pitch", "--yaw")
 _FRAMES = ("--frame-id", "--child-frame-id")
 _FLAGS = frozenset({*_POSITION, *_QUATERNION, *_ANGLES, *_FRAMES})
-#: Numbers and frames of the orders with angles and with a quaternion.
+#: The numbers of positional arguments: with angles, and with a quaternion.
 _WITH_ANGLES, _WITH_QUATERNION = 8, 9
-#: As far as tf2 lets the square of a quaternion's length be from 1.
+#: The largest difference from 1 that tf2 accepts in the square of a quaternion's length.
 _UNIT = 0.01
 _LARGEST_RAD = 1e9
 
 
 class ArgumentsRefusedError(ValueError):
-    """The program would refuse these arguments, or listeners the resulting transform."""
+    """The program would reject these arguments, or listeners would reject the transform."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +55,9 @@ class StaticTransform:
     parent: str
     child: str
     pose: Pose
-    #: Radians; None if the arguments give a quaternion.
+    #: Roll, pitch and yaw in radians; None if the arguments contain a quaternion.
     rpy: Vector | None
-    #: The order of positional arguments, in words; empty if the arguments are named.
+    #: A description of the order of positional arguments; empty if the arguments are named.
     order: str
 
     def keys(self) -> dict[str, Any]:
@@ -66,17 +66,17 @@ class StaticTransform:
 
 
 def static_transform(argv: Sequence[str], reader: Reader = "ros2") -> StaticTransform:
-    """Return the transform from the program's own arguments, without ``--ros-args``.
+    """Return the transform for the program's arguments; ROS arguments are ignored.
 
     Raises:
-        RefusedError: if it would refuse them.
+        ArgumentsRefusedError: if the program would reject them.
     """
-    own = _without_ros_arguments(argv)
+    arguments = _without_ros_arguments(argv)
     if reader != "ros2":
-        return _in_order(own, reader)
+        return _in_order(arguments, reader)
     options: dict[str, str] = {}
-    loose: list[str] = []
-    rest = iter(own)
+    positional: list[str] = []
+    rest = iter(arguments)
     for argument in rest:
         if argument in _FLAGS:
             value = next(rest, None)
@@ -84,14 +84,14 @@ def static_transform(argv: Sequence[str], reader: Reader = "ros2") -> StaticTran
                 raise ArgumentsRefusedError(f"{argument} has no value")
             options[argument] = value
         else:
-            loose.append(argument)
-    if not loose:
+            positional.append(argument)
+    if not positional:
         return _by_name(options)
     if options:
         raise ArgumentsRefusedError(
-            f"{loose[0]} next to {next(iter(options))}: give arguments by name or in order"
+            f"{positional[0]} next to {next(iter(options))}: give arguments by name or in order"
         )
-    return _in_order(loose, reader)
+    return _in_order(positional, reader)
 
 
 def static_words(params: Sequence[Any]) -> list[str]:
@@ -108,19 +108,19 @@ def static_words(params: Sequence[Any]) -> list[str]:
 
 
 def _without_ros_arguments(argv: Sequence[str]) -> list[str]:
-    """Return the words outside ``--ros-args … --``.
+    """Return the arguments outside ``--ros-args … --``.
 
-    Those of ROS 1, as in ``__name:=a``, are left out too.
+    ROS arguments of ROS 1, such as ``__name:=a``, are also left out.
     """
-    own, inside = [], False
+    arguments, inside = [], False
     for argument in argv:
         if argument == "--ros-args":
             inside = True
         elif argument == "--" and inside:
             inside = False
         elif not inside and ":=" not in argument:
-            own.append(argument)
-    return own
+            arguments.append(argument)
+    return arguments
 
 
 def _by_name(options: dict[str, str]) -> StaticTransform:
@@ -214,14 +214,16 @@ def _number(text: str, what: str) -> float:
 
 
 def reader_of(argv: Sequence[str]) -> Reader:
-    """Return which program reads the arguments if the package is not given.
+    """Return the program that reads the arguments, if the package is unknown.
 
-    tf's version has a period after two frames.
+    The program of ROS 1's tf has a period after the two frames.
     """
-    own = _without_ros_arguments(argv)
+    arguments = _without_ros_arguments(argv)
     return (
         "tf"
-        if len(own) > _WITH_ANGLES and _is_number(own[-1]) and not _is_number(own[-3])
+        if len(arguments) > _WITH_ANGLES
+        and _is_number(arguments[-1])
+        and not _is_number(arguments[-3])
         else "ros2"
     )
 

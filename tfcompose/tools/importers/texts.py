@@ -1,6 +1,7 @@
 """Texts with parts that are known only when the robot is built.
 
-A launch argument may have another value then, and a file's text is not read here.
+A launch argument may have another value when the robot is built. The import does not read the text
+of a file; it only keeps the file's name.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class FileText:
 
 @dataclass(frozen=True, slots=True)
 class MadeFile:
-    """The path, relative to the robot file, of a file that is brought along."""
+    """The path, relative to the robot file, of a file that the import writes."""
 
     file: str
 
@@ -40,7 +41,8 @@ Part = str | Argument | FileText | MadeFile
 class Text(str):
     """A text that contains arguments or files' texts.
 
-    For code that reads a ``str``, an argument is its value, and a file's text is the file's name.
+    As a plain ``str``, a Text contains the value of each argument, and the name of each file
+    instead of its text.
     """
 
     __slots__ = ("parts",)
@@ -48,7 +50,7 @@ class Text(str):
 
     @staticmethod
     def of(parts: Iterable[Part]) -> str:
-        """Return the text of these parts, a plain one if all are known."""
+        """Return the text of these parts; it is a plain ``str`` if all parts are known."""
         merged: list[Part] = []
         for part in parts:
             if isinstance(part, str) and merged and isinstance(merged[-1], str):
@@ -107,9 +109,9 @@ def partition(text: str, separator: str) -> tuple[str, str, str]:
 
 
 def words_of(text: str) -> list[str]:
-    """Return the words of a command line with shell quotes.
+    """Split a command line with shell quotes into words.
 
-    An argument is within a word, whatever its value is.
+    An argument never splits a word, even if its value contains spaces.
     """
     fields: list[list[Part]] = []
     quote, is_open, is_escaped = "", False, False
@@ -139,7 +141,7 @@ def _characters(text: str) -> Iterator[Part]:
 
 
 def argument_of(text: Any) -> Argument | None:
-    """Return the argument that makes up the whole text."""
+    """Return the argument, if the text consists only of an argument; else None."""
     match text:
         case Text(parts=(Argument() as argument,)):
             return argument
@@ -171,7 +173,7 @@ def files_in(text: Any) -> list[FileText]:
 
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
-#: A text as JSON has it: plain, or its parts.
+#: The JSON schema of a text: a string, or the list of its parts.
 SHAPE: tuple[Any, ...] = (
     str,
     {"parts": [(str, {"argument": str, "value": str}, {"file": str, "args": {"*": str}})]},
@@ -195,7 +197,7 @@ def _part_as_json(part: Part) -> Any:
 
 
 def from_json(value: Any) -> Any:
-    """Return the text for JSON data that fits ``SHAPE``; other values are unchanged."""
+    """Return the text for JSON data that fits ``SHAPE``; return other values unchanged."""
     if isinstance(value, dict):
         return Text.of(map(_part_from_json, value["parts"]))
     return value

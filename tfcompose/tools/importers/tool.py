@@ -1,4 +1,4 @@
-"""Import tool: a robot file from URDF, launch files, scripts or a running robot."""
+"""The tool ``import``: robot files from URDF, launch files, scripts or a running robot."""
 
 from tfcompose.foundation.tool import Command, Tool
 

@@ -1,4 +1,4 @@
-"""Import of a robot_state_publisher's description: xacro becomes a part, URDF becomes links."""
+"""Import of a robot_state_publisher's description: a part for xacro, links for URDF."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.program import Description
 
 _OUTSIDE = "--package NAME=FOLDER names its package; --trust is for files of your own"
-#: As what the text of a description is read.
+#: The file name in findings about the text of a description.
 _TEXT = "robot_description.urdf"
 
 
 @dataclass(frozen=True, slots=True)
-class Workshop:
-    """Context for reading descriptions: packages, named folders, presets (None: no match)."""
+class ImportContext:
+    """Packages, folders that the user names, and presets (None to recognise no sensors)."""
 
     packages: Packages
     target: Target
@@ -38,17 +38,17 @@ class Workshop:
 
 
 def add_descriptions(
-    draft: ImportDraft, descriptions: Iterable[Description], workshop: Workshop
+    draft: ImportDraft, descriptions: Iterable[Description], context: ImportContext
 ) -> None:
     """Add the descriptions of robot_state_publishers.
 
-    The first URDF becomes links; further ones are only named.
+    The first URDF becomes links. A comment names each further URDF.
     """
     for described in descriptions:
         if draft.is_adopted:
-            _add_external_part(draft, described, workshop)
+            _add_external_part(draft, described, context)
         elif described.file and not described.file.endswith(".urdf"):
-            _add_part(draft, described, workshop)
+            _add_part(draft, described, context)
         elif draft.sections["links"]:
             draft.todo(
                 "a second robot_state_publisher with a URDF",
@@ -56,20 +56,20 @@ def add_descriptions(
                 advice="parts: {NAME: {urdf: FILE}}",
             )
         else:
-            _add_links(draft, described, workshop)
+            _add_links(draft, described, context)
 
 
-def _add_external_part(draft: ImportDraft, described: Description, workshop: Workshop) -> None:
-    """Add a description as a part whose edges a robot_state_publisher goes on to publish."""
+def _add_external_part(draft: ImportDraft, described: Description, context: ImportContext) -> None:
+    """Add a description as a part whose edges robot_state_publisher continues to publish."""
     if described.file.endswith(".xacro"):
-        _add_part(draft, described, workshop)
+        _add_part(draft, described, context)
         part = next(reversed(draft.sections["parts"]))
     else:
         part = draft.robot
         file = described.file or f"{draft.robot}.urdf"
         if described.text:
             draft.neighbours[file] = described.text
-        address = file if described.text else path_from(workshop.target, file)
+        address = file if described.text else path_from(context.target, file)
         prefix = {"prefix": described.prefix} if described.prefix else {}
         draft.sections["parts"][part] = {"urdf": address, **prefix}
         draft.note(("parts", part), where(described.span, "what robot_state_publisher is given"))
@@ -79,21 +79,21 @@ def _add_external_part(draft: ImportDraft, described: Description, workshop: Wor
     draft.sections["parts"][part]["owner"] = owner
 
 
-def _add_part(draft: ImportDraft, described: Description, workshop: Workshop) -> None:
+def _add_part(draft: ImportDraft, described: Description, context: ImportContext) -> None:
     path = described.file
     around = (
         (name, folder)
-        for name, folder in workshop.folders.items()
+        for name, folder in context.folders.items()
         if path.startswith(folder.rstrip("/") + "/")
     )
     package, folder = next(around, ("", ""))
     if package:
         address = f"{PACKAGE}{package}/{posixpath.relpath(path, folder)}"
-        draft.sections["packages"][package] = workshop.target.from_folder(folder)
-    elif found := _installed_path(path, workshop.packages):
-        address = found
+        draft.sections["packages"][package] = context.target.from_folder(folder)
+    elif installed := _installed_path(path, context.packages):
+        address = installed
     else:
-        address = path if path.startswith(PACKAGE) else path_from(workshop.target, path)
+        address = path if path.startswith(PACKAGE) else path_from(context.target, path)
     keys = {"xacro": address}
     keys |= {"args": dict(described.args)} if described.args else {}  # type: ignore[dict-item]
     keys |= {"prefix": described.prefix} if described.prefix else {}
@@ -104,7 +104,7 @@ def _add_part(draft: ImportDraft, described: Description, workshop: Workshop) ->
 
 
 def _installed_path(path: str, packages: Packages) -> str:
-    """Return the address of a file in a package that is installed, empty for any other."""
+    """Return the ``package://`` address of a file in an installed package; empty for others."""
     for prefix in packages.disk.prefixes if packages.disk else ():
         share = prefix.rstrip("/") + "/share/"
         if path.startswith(share) and path.count("/", len(share)):
@@ -112,12 +112,12 @@ def _installed_path(path: str, packages: Packages) -> str:
     return ""
 
 
-def _add_links(draft: ImportDraft, described: Description, workshop: Workshop) -> None:
-    packages, file = workshop.packages, described.file
+def _add_links(draft: ImportDraft, described: Description, context: ImportContext) -> None:
+    packages, file = context.packages, described.file
     if described.text and packages.disk:
         text = described.text
-        own = replace(packages.disk, read=lambda _: text)
-        packages, file = Packages(own, packages.named, packages.advice), _TEXT
+        packages_of_text = replace(packages.disk, read=lambda _: text)
+        packages, file = Packages(packages_of_text, packages.named, packages.advice), _TEXT
     elif file.startswith(PACKAGE):
         draft.todo(f"the description {file}: its package was not found", described.span)
         return
@@ -134,9 +134,7 @@ def _add_links(draft: ImportDraft, described: Description, workshop: Workshop) -
     for finding in document.findings():
         if finding.severity == "error":
             draft.todo(f"the description has {finding.code}: {finding.message}", described.span)
-    robot = import_document(
-        document, workshop.target, draft.robot, packages.local, workshop.library
-    )
+    robot = import_document(document, context.target, draft.robot, packages.local, context.library)
     if described.prefix:
         draft.sections["ros"]["frame_prefix"] = described.prefix
     put_into(draft, robot)

@@ -1,6 +1,7 @@
-"""Bodies, joints and poses as plain data in the robot file's language.
+"""Bodies, joints and poses of a robot as plain data for a robot file.
 
-Defaults are omitted. Angles are in degrees if that is exact, else in radians with all digits.
+The data do not contain default values. An angle is in degrees if this is exact, else in radians
+with all digits.
 """
 
 from __future__ import annotations
@@ -21,24 +22,25 @@ if TYPE_CHECKING:
     from tfcompose.model.files import Target
     from tfcompose.model.robot import Edge, Inertial, Joint, Link, Material, Robot, Shape
 
-#: A whole number of degrees, or one of few decimals, is what was meant if the angle (rad) is so
-#: near.
+#: The largest difference (rad) at which an angle is written as a number of degrees with few
+#: decimals.
 _MEANT_RAD = 5e-13
 _DECIMALS = 4
-#: And a rotation is the one of the source if it is so near; half an angle's error remains in a
-#: quaternion.
+#: The largest difference (rad) at which a rotation is written with the source's angles. A
+#: quaternion keeps half of an angle's error.
 _SAME_RAD = 1e-12
 
 _SOFT_LIMITS = ("soft_lower_limit", "soft_upper_limit")
-#: The axis of a joint that gives none.
+#: URDF's default axis of a joint.
 _X = (1.0, 0.0, 0.0)
 _DIAGONAL = ("ixx", "iyy", "izz")
 
 
 class RobotFileValues:
-    """The values of one robot; later uses of a described colour have only its name.
+    """Converts parts of a robot to plain data.
 
-    ``rpy`` are the source's angles of rotations; ``target`` says how files are addressed.
+    A colour is described at its first use; later uses contain only its name. ``rpy`` contains the
+    source's angles, by rotation. ``target`` is the robot file, from which relative paths start.
     """
 
     def __init__(self, rpy: Mapping[Quaternion, Vector], robot: Robot, target: Target) -> None:
@@ -52,7 +54,7 @@ class RobotFileValues:
         return ({"xyz": list(pose.xyz)} if any(pose.xyz) else {}) | ({"rpy": rpy} if rpy else {})
 
     def link(self, link: Link) -> dict[str, Any]:
-        """Return the body."""
+        """Return the keys of a link's body."""
         visuals = [self.shape(shape) for shape in link.visuals]
         collisions = [self.shape(shape, plain=True) for shape in link.collisions]
         body: dict[str, Any] = (
@@ -65,7 +67,7 @@ class RobotFileValues:
         return body | ({"inertial": self.inertial(link.inertial)} if link.inertial else {})
 
     def shape(self, shape: Shape, *, plain: bool = False) -> dict[str, Any]:
-        """Return the shape; ``plain``: without its colour."""
+        """Return the keys of a shape; if ``plain``, without its colour."""
         values = self.pose(shape.pose) | {shape.kind: self.size(shape)}
         return (
             values
@@ -74,7 +76,7 @@ class RobotFileValues:
         )
 
     def material(self, material: Material) -> dict[str, Any]:
-        """Return the colour or texture, and its name."""
+        """Return the keys of a material: colour or texture, and name."""
         values: dict[str, Any] = {"name": material.name}
         if material.name in self.described and material.name not in self.clashing:
             return values
@@ -85,7 +87,7 @@ class RobotFileValues:
         )
 
     def size(self, shape: Shape) -> Any:
-        """Return the shape's size, or its file."""
+        """Return the value of a shape's key: its size, or its file."""
         if shape.kind == "box":
             return list(shape.size)
         if shape.mesh is None:
@@ -98,7 +100,7 @@ class RobotFileValues:
         )
 
     def inertial(self, inertial: Inertial) -> dict[str, Any]:
-        """Return mass and tensor."""
+        """Return the keys of mass and inertia."""
         tensor = dict(zip(MOMENTS, inertial.tensor, strict=True))
         moments = {key: tensor[key] for key in _DIAGONAL} | {
             key: value for key, value in tensor.items() if value
@@ -106,7 +108,7 @@ class RobotFileValues:
         return self.pose(inertial.pose) | {"mass": inertial.mass, "inertia": moments}
 
     def joint(self, edge: Edge, owner: str | None) -> dict[str, Any]:
-        """Return the joint with its edge."""
+        """Return the keys of a joint and its edge."""
         joint = edge.joint or edge.free
         values: dict[str, Any] = {
             "type": joint.type if joint else "fixed",
@@ -146,17 +148,17 @@ def _radians(value: str | float) -> float:
 
 
 def _clashing(robot: Robot) -> frozenset[str]:
-    """Return the names under which the robot has different colours."""
-    known: dict[str, set[Any]] = {}
+    """Return the names that materials with different colours share."""
+    values: dict[str, set[Any]] = {}
     for material in materials(robot.links):
-        known.setdefault(material.name, set()).add((material.rgba, material.texture))
-    return frozenset(name for name, kinds in known.items() if len(kinds) > 1)
+        values.setdefault(material.name, set()).add((material.rgba, material.texture))
+    return frozenset(name for name, kinds in values.items() if len(kinds) > 1)
 
 
 def _axis(joint: Joint) -> list[float]:
-    """Return the axis at the length that it has in the source, if that is nearly 1.
+    """Return the joint's axis.
 
-    Its digits are fewer.
+    If its length in the source is nearly 1, return the source's numbers, which have fewer digits.
     """
     if not 0.98 < joint.axis_length < 1.02:  # noqa: PLR2004 (another length is a finding of its own)
         return list(joint.axis)
@@ -169,7 +171,7 @@ def _motion(joint: Joint) -> dict[str, Any]:
     limit, reference = joint.limit, joint.reference
     if limit:
         ends = {"lower": limit.lower, "upper": limit.upper}
-        if joint.type in BOUNDED:  # of these URDF takes 0 for an end that is left out
+        if joint.type in BOUNDED:  # URDF's default for a missing limit of these joints is 0
             ends = {key: value or 0.0 for key, value in ends.items()}
         limits = {key: position(value) for key, value in ends.items() if value is not None}
         rates = {"effort": limit.effort, "velocity": limit.velocity}

@@ -1,4 +1,4 @@
-"""Expressions and arguments of a robot file, next to arbitrary text."""
+"""Separation of expressions of a robot file from other text with ``${``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class ExpressionText(str):
-    """An expression to evaluate: ``${…}`` in the written file."""
+    """A text that is an expression, written as ``${…}``."""
 
     __slots__ = ()
 
@@ -20,7 +20,7 @@ class ExpressionText(str):
 def without_expressions(
     sections: dict[str, dict[str, Any]],
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """Return sections without accidental expressions, and the variable they need."""
+    """Return the sections without unintended expressions, and the variables they need."""
     literals = (
         part
         for text in texts_in(sections)

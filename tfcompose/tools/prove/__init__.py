@@ -1,1 +1,1 @@
-"""Declared mounts against what sensors measure."""
+"""Comparison of declared mounts with measurements of sensors."""

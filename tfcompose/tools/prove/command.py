@@ -1,15 +1,18 @@
 """Compare declared mounts with what sensors measure.
 
-Read messages of the running robot, or of a recording, and compare them with the mounts that FILE
-declares. Each check agrees, differs, or cannot tell: without enough motion it says so. Gravity and
-yaw rate need an IMU, and yaw rate also odometry while the robot drives curves. Every message needs
-the frame that the file declares for it. Name sensors to check only those.
+Read messages of the running robot or of a recording, and compare them with the mounts that FILE
+declares. Each check agrees, differs, or cannot tell, for example because the robot moved too
+little. The checks of gravity and yaw rate need an IMU; the check of the yaw rate also needs
+odometry while the robot drives curves. The checks of floor, height and heading need a lidar or a
+depth camera. Check that every message has the frame that the file declares. Name sensors to check
+only these.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_bag, add_for, add_format, add_variant
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import RosSettings
+    from tfcompose.model.robot import Robot
     from tfcompose.tools.prove.recording import Measurements
     from tfcompose.tools.prove.verdict import SensorVerdict
 
@@ -29,10 +33,14 @@ DURATION_S = 30.0
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
+    """Add the arguments of ``prove``."""
     parser.add_argument("file", metavar="ROBOT", help="the robot file")
     parser.add_argument(
-        "sensors", nargs="*", metavar="SENSOR", help="a sensor, or a frame; default: all"
+        "sensors",
+        nargs="*",
+        default=[],
+        metavar="SENSOR",
+        help="a sensor, or a frame; default: all",
     )
     add_variant(parser)
     add_for(parser, f"listen for S seconds; default: {DURATION_S:g}")
@@ -44,7 +52,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Check the sensors; exit code 0, 1 if one differs, 2 if no check could tell anything."""
+    """Check the sensors; exit code 0, 1 if a check differs, 2 if no check can tell."""
     from tfcompose.cli.compiling import compile_without_errors
     from tfcompose.cli.live import recording_day
     from tfcompose.cli.reading import read_text
@@ -53,13 +61,7 @@ def run(arguments: Namespace) -> int:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
     day = recording_day(arguments.bag)
     robot, _ = compile_without_errors(arguments.file, arguments, day)
-    names = {sensor.name for sensor in robot.sensors} | robot.frames.keys()
-    for name in arguments.sensors:
-        if name not in names:
-            from tfcompose.foundation.findings import did_you_mean
-
-            advice = did_you_mean(name, names, f"{arguments.file} has other sensors")
-            fail(f"unknown sensor {name}; {advice}", UNREADABLE)
+    _refuse_unknown_sensors(arguments, robot)
     measurements = _measure(arguments, robot.ros)
     prove = _prover(arguments, measurements, day)
     verdicts = prove(read_text)
@@ -69,11 +71,31 @@ def run(arguments: Namespace) -> int:
     return _report(arguments, verdicts, fixed)
 
 
-def _measure(arguments: Namespace, ros: RosSettings) -> Measurements:
-    """Return what the sensors measure.
+def _refuse_unknown_sensors(arguments: Namespace, robot: Robot) -> None:
+    """Refuse names that are neither sensors nor frames.
 
     Raises:
-        SystemExit: after reporting why that cannot be read.
+        SystemExit: after naming the robot's sensors.
+    """
+    from tfcompose.foundation.findings import did_you_mean
+
+    sensors = [sensor.name for sensor in robot.sensors]
+    has = f"its sensors are {', '.join(sensors)}" if sensors else "it has no sensors, but frames"
+    unknown = [
+        f"{arguments.file} has no sensor or frame {name};"
+        f" {did_you_mean(name, [*sensors, *robot.frames], has)}"
+        for name in arguments.sensors
+        if name not in sensors and name not in robot.frames
+    ]
+    if unknown:
+        fail("\n".join(unknown), UNREADABLE)
+
+
+def _measure(arguments: Namespace, ros: RosSettings) -> Measurements:
+    """Return the messages of the sensors.
+
+    Raises:
+        SystemExit: after reporting why they cannot be read.
     """
     from tfcompose.cli.live import from_bag, set_up_ros
     from tfcompose.foundation.findings import finding
@@ -100,8 +122,12 @@ def _measure(arguments: Namespace, ros: RosSettings) -> Measurements:
 def _prover(
     arguments: Namespace, measurements: Measurements, day: date | None
 ) -> Callable[[Callable[[str], str]], list[SensorVerdict]]:
-    """Return a function that proves the file as a reader returns it."""
+    """Return a function that checks the robot file.
+
+    The function takes a reader of files, so that it can also check an edited file.
+    """
     from tfcompose.cli.compiling import compile_file
+    from tfcompose.compiler.check import apply
     from tfcompose.tools.prove.proof import Proof
 
     def prove(read: Callable[[str], str]) -> list[SensorVerdict]:
@@ -110,7 +136,14 @@ def _prover(
             reject(compiled.findings)
         texts = {arguments.file: read(arguments.file)}
         only = frozenset(arguments.sensors)
-        return Proof(compiled.robot, compiled.sources[0], texts, measurements, only).verdicts()
+        proof = Proof(compiled.robot, compiled.sources[0], texts, measurements, only)
+        verdicts = proof.verdicts()
+        kept, _ = apply(findings_of(verdicts), compiled.allows)
+        allowed = [each for each in verdicts if each.finding and each.finding not in kept]
+        return [
+            *(each for each in verdicts if each not in allowed),
+            *(replace(each, finding=None) for each in allowed),
+        ]
 
     return prove
 
@@ -138,7 +171,7 @@ def _fix(
 
 
 def findings_of(verdicts: Sequence[SensorVerdict]) -> list[Finding]:
-    """Return the findings of verdicts, in order of their places."""
+    """Return the findings of verdicts, in the order of their locations."""
     findings = [verdict.finding for verdict in verdicts if verdict.finding]
     return sorted(findings, key=lambda finding: finding.sort_key)
 
@@ -152,11 +185,13 @@ def _report(arguments: Namespace, verdicts: list[SensorVerdict], fixed: list[Fin
     else:
         for verdict in verdicts:
             judgement = verdict.judgement
-            if judgement.answer != "differs":
+            if verdict.finding is None:
                 print(f"{verdict.sensor}: {judgement.check} {judgement.answer}: {judgement.text}")
         for finding in fixed:
             print(f"fixed: {finding.message}")
     print_findings(findings, sys.stderr)
+    if not verdicts:
+        fail(f"no message came in a frame of {arguments.file}, which has no sensors", UNREADABLE)
     if findings:
         return FAILED
     return 0 if any(each.judgement.answer == "agrees" for each in verdicts) else UNREADABLE

@@ -1,4 +1,4 @@
-"""Frames in messages' headers, against those that the robot file declares for them."""
+"""Check of the ``frame_id`` in messages against the frame that the robot file declares."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from tfcompose.tools.prove.messages import MeasuredTopic
 
 CHECK = "frame"
-#: A body of a camera has x forward within this angle, in radians.
+#: The largest angle in radians between x of a camera's body frame and its viewing direction.
 _NEAR_RAD = 0.35
 
 
 def judge_frame(
     robot: Robot, topic: MeasuredTopic, declared: str, base_from_frames: dict[str, Pose]
 ) -> CheckResult:
-    """Return whether a topic's messages have the right frame.
+    """Compare the frame in a topic's messages with the declared frame.
 
-    ``declared`` is the frame that the driver should use, with the robot's prefix; empty if the
-    file does not say.
+    ``declared`` is the frame that the driver should use, with the robot's prefix. It is empty if
+    the file does not declare a frame.
     """
     finals = {robot.final(name): name for name in robot.frames}
     frame = topic.frame

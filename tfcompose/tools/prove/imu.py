@@ -1,20 +1,19 @@
-"""IMU checks: gravity, yaw rate and acceleration against the declared mount.
+"""Checks of an IMU's mount: gravity, yaw rate and acceleration.
 
-Where gravity and yaw rate point along one other axis, the IMU is mounted another way than the
-file declares. Where they contradict each other, no mount fits: the driver has a sign wrong. An
-accelerometer at rest measures +9.81 m/s² along the axis that points up (REP-145).
+An accelerometer at rest measures +9.81 m/s² along the axis that points up (REP-145). If gravity
+and yaw rate both point along the same other axis, the mount differs from the robot file. If they
+contradict each other, no mount fits, and the driver has a wrong sign.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import permutations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tfcompose.foundation.geometry import matrix_from_quat, quat_from_matrix, rpy_from_quat
+from tfcompose.tools.prove.rotations import UP, angle_of, frame_of, level, quat_of, snap
 from tfcompose.tools.prove.verdict import CheckResult
 
 if TYPE_CHECKING:
@@ -28,34 +27,41 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 G = 9.80665
-_UP = np.array([0.0, 0.0, 1.0])
-#: An accelerometer's scale, and a driving base, may be off by this factor.
+#: The accepted range of measured gravity, as a factor of g. It allows for an accelerometer's scale
+#: error and for the motion of the base.
 _G_RANGE = (0.93, 1.07)
-#: Odometry's yaw rate may be off by this factor: wheels slip.
+#: The accepted range of the measured yaw rate, as a factor of odometry's yaw rate. It allows for
+#: slipping wheels.
 _RATE_RANGE = (0.75, 1.33)
-#: Between these angles two axes neither agree nor are opposite.
+#: Two axes agree below the first angle, and are opposite above the second, in radians.
 _SAME_RAD, _OPPOSITE_RAD = math.radians(20), math.radians(160)
-#: Yaw from accelerations is known only this well, in radians; larger errors are found.
+#: The accuracy of a yaw that is measured by accelerations, in radians. Only larger differences are
+#: reported.
 _YAW_RAD = math.radians(20)
-#: An estimate whose standard error is larger says nothing, in radians.
+#: A constant bias of the accelerometer looks like a tilt, for every motion on a level floor. This
+#: is the tilt in radians for a bias of 15 mg, which is typical of data sheets of MEMS
+#: accelerometers.
+_BIAS_RAD = 0.015
+#: The largest standard error of a usable estimate, in radians.
 _VAGUE_RAD = math.radians(5)
-#: Beyond this tilt gravity alone does not tell a mount from a sign.
+#: The tilt in radians above which gravity alone cannot distinguish a wrong mount from a wrong
+#: sign.
 _UPSIDE_DOWN_RAD = math.radians(150)
-#: Standard errors by which a measurement has to be beyond its limit.
+#: A measurement differs only if it exceeds its limit by this many standard errors.
 _SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class ImuCheck:
-    """What an IMU measures, against the declared rotation of its frame in the base."""
+    """Compares an IMU's measurements with the declared rotation of its frame in the base."""
 
     motion: Motion
     base_from_frame: Array
-    #: By how much gravity may be tilted, in radians.
+    #: The largest accepted tilt of gravity, in radians.
     limit_rad: float
 
     def judge(self) -> Iterator[CheckResult]:
-        """Yield the judgements on gravity, yaw rate and heading."""
+        """Yield the results of the checks of gravity, yaw rate and heading."""
         yield self._judge_gravity()
         yield from self._judge_yaw_rate()
         yield from self._judge_heading()
@@ -67,10 +73,9 @@ class ImuCheck:
         if not _within(up.length / G, _G_RANGE):
             return self._judge_force(up)
         tilt = self._tilt_rad(up)
-        values = {"tilt_rad": tilt, "error_rad": up.error_rad}
-        measured = (
-            f"{math.degrees(tilt):.1f} ± {max(0.01, math.degrees(up.error_rad)):.1g} deg from up"
-        )
+        error = math.hypot(up.error_rad, _BIAS_RAD)
+        values = {"tilt_rad": tilt, "error_rad": error}
+        measured = f"{math.degrees(tilt):.1f} ± {math.degrees(error):.1f} deg from up"
         if not self._is_beyond(tilt, up):
             if self._is_vague(up):
                 reason = f"gravity scatters by {math.degrees(up.error_rad):.0f} deg"
@@ -113,7 +118,10 @@ class ImuCheck:
         return CheckResult("gravity", "differs", text, "TF651", advice, values=values)
 
     def _judge_yaw_rate(self) -> Iterator[CheckResult]:
-        """Yield the judgement on the gyroscope; none if gravity shows the same other mount."""
+        """Yield the result for the gyroscope.
+
+        Yield nothing if gravity already shows the same other mount.
+        """
         axis, check = self.motion.yaw_axis, "yaw rate"
         if axis is None:
             degrees = math.degrees(self.motion.yaw_rate_std)
@@ -147,7 +155,7 @@ class ImuCheck:
             advice = "gravity is not measured, so the mount is not known"
             yield CheckResult(check, "differs", text, "TF651", advice, values=values)
             return
-        apart = _angle(axis.direction, up.direction)
+        apart = angle_of(axis.direction, up.direction)
         if apart <= _SAME_RAD:
             return
         text = f"measures the base's yaw {_axis_name(self.base_from_frame, axis)}"
@@ -162,7 +170,10 @@ class ImuCheck:
         return
 
     def _judge_heading(self) -> Iterator[CheckResult]:
-        """Yield whether accelerations point forward; nothing if gravity shows another mount."""
+        """Yield the result for the direction of accelerations.
+
+        Yield nothing if gravity already shows another mount.
+        """
         forward, up = self.motion.forward, self.motion.up
         if up is None or self._is_beyond(self._tilt_rad(up), up):
             return
@@ -190,40 +201,25 @@ class ImuCheck:
         return
 
     def _fit(self, up: Estimate) -> tuple[Quaternion | None, str]:
-        """Return the rotation of the frame in the base that fits, else why there is none."""
+        """Return the fitting rotation of the frame in the base, or why there is none."""
         declared, forward = self.base_from_frame, self.motion.forward
         tilt, axis = self._tilt_rad(up), self.motion.yaw_axis
-        if axis is not None and _angle(axis.direction, up.direction) > _SAME_RAD:
+        if axis is not None and angle_of(axis.direction, up.direction) > _SAME_RAD:
             return None, "gravity and yaw rate do not fit one mount: check the driver's axes"
         if tilt > _UPSIDE_DOWN_RAD and axis is None:
             return None, "it is upside down, or the driver has the wrong sign: drive curves"
         if tilt > _UPSIDE_DOWN_RAD:
-            # Any horizontal axis would do, so the usual one: it is upside down about x.
+            # A half turn about any horizontal axis fits; x is the usual axis.
             declared = np.diag([1.0, -1.0, -1.0]) @ declared
-        level = _level(declared, up.direction)
+        leveled = level(declared, up.direction)
         if forward is not None and forward.error_rad <= _VAGUE_RAD:
-            x, y, _ = level @ forward.direction
+            x, y, _ = leveled @ forward.direction
             if abs(math.atan2(y, x)) > _YAW_RAD + _SIGMAS * forward.error_rad:
-                level = _frame_of(forward.direction, up.direction)
-        return _quat(self._snap(up, level)), ""
-
-    def _snap(self, up: Estimate, rotation: Array) -> Array:
-        """Return quarter rotations of the declared mount if they fit as well, else this."""
-        near = min(
-            (
-                candidate
-                for quarter in _quarter_rotations()
-                for candidate in (quarter @ self.base_from_frame, quarter)
-            ),
-            key=lambda candidate: _apart(candidate, rotation),
-        )
-        limit = max(self.limit_rad, _YAW_RAD / 2)
-        if _apart(near, rotation) > limit or _angle(near @ up.direction, _UP) > self.limit_rad:
-            return rotation
-        return near
+                leveled = frame_of(forward.direction, up.direction)
+        return quat_of(snap(leveled, self.base_from_frame, up.direction, self.limit_rad)), ""
 
     def _tilt_rad(self, estimate: Estimate) -> float:
-        return _angle(self.base_from_frame @ estimate.direction, _UP)
+        return angle_of(self.base_from_frame @ estimate.direction, UP)
 
     def _is_beyond(self, tilt_rad: float, estimate: Estimate) -> bool:
         return tilt_rad > self.limit_rad + _SIGMAS * estimate.error_rad
@@ -235,69 +231,15 @@ class ImuCheck:
         up, axis = self.motion.up, self.motion.yaw_axis
         if up is None or axis is None:
             return False
-        return _angle(up.direction, axis.direction) >= _OPPOSITE_RAD
-
-
-def describe_rotation(quat_xyzw: Quaternion) -> str:
-    """Return a rotation as roll, pitch and yaw in degrees."""
-    angles = (round(math.degrees(angle), 1) + 0.0 for angle in rpy_from_quat(quat_xyzw))
-    return f"rpy: [{', '.join(f'{angle:g} deg' for angle in angles)}]"
-
-
-def matrix_of(quat_xyzw: Quaternion) -> Array:
-    """Return the rotation matrix, shape (3, 3)."""
-    return np.array(matrix_from_quat(quat_xyzw))
-
-
-def _quat(rotation: Array) -> Quaternion:
-    rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in rotation)
-    return quat_from_matrix((rows[0], rows[1], rows[2]))
+        return angle_of(up.direction, axis.direction) >= _OPPOSITE_RAD
 
 
 def _within(value: float, bounds: tuple[float, float]) -> bool:
     return bounds[0] <= value <= bounds[1]
 
 
-def _angle(a: Array, b: Array) -> float:
-    return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
-
-
-def _apart(a: Array, b: Array) -> float:
-    return math.acos(float(np.clip((np.trace(a.T @ b) - 1) / 2, -1, 1)))
-
-
-def _frame_of(forward: Array, up: Array) -> Array:
-    """Return the rotation that maps these directions of a frame to x and z of the base."""
-    left = np.cross(up, forward)
-    left /= np.linalg.norm(left)
-    return np.vstack([np.cross(left, up), left, up])
-
-
-def _level(rotation: Array, up: Array) -> Array:
-    """Return the smallest change of a rotation that maps ``up`` to z."""
-    begin = rotation @ up
-    axis = np.cross(begin, _UP)
-    sine, cosine = float(np.linalg.norm(axis)), float(begin @ _UP)
-    if sine < 1e-9:  # noqa: PLR2004 (rounding: there is nothing to change)
-        return rotation
-    x, y, z = axis / sine
-    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    change: Array = np.identity(3) + sine * skew + (1 - cosine) * skew @ skew
-    return change @ rotation
-
-
-def _quarter_rotations() -> Iterator[Array]:
-    """Yield the 24 rotations by quarter turns about the axes."""
-    for order in permutations(range(3)):
-        for signs in product((1.0, -1.0), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), order] = signs
-            if np.linalg.det(matrix) > 0:
-                yield matrix
-
-
 def _axis_name(base_from_frame: Array, estimate: Estimate) -> str:
-    """Return the nearest axis of the base to a direction: ``about -z``."""
+    """Return the axis of the base that is nearest to a direction, such as ``about -z``."""
     direction = base_from_frame @ estimate.direction
     index = int(np.argmax(np.abs(direction)))
     sign = "-" if direction[index] < 0 else ""

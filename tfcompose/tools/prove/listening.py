@@ -1,4 +1,4 @@
-"""Measurements of sensors of the running robot."""
+"""Recording of sensor messages of the running robot."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from tfcompose.tools.prove.recording import Measurements
 if TYPE_CHECKING:
     from tfcompose.foundation.signals import Stop
 
-#: How often new topics are looked up, in seconds.
+#: The interval at which the ROS graph is searched for new topics, in seconds.
 _ASK_EVERY_S = 0.5
 _WAIT_S = 0.1
-#: How many messages of a topic are kept until they are taken.
+#: The depth of the queue of each topic, in messages.
 _DEPTH = 100
 
 
 def listen(duration_s: float, stop: Stop) -> Measurements:
-    """Return what comes from the running robot within a time, or until a signal.
+    """Return the sensor messages of the running robot within a time, or until a signal.
 
-    Images are left out: their CameraInfo has the same header.
+    This function does not read images, because their CameraInfo has the same header.
 
     Raises:
-        RosError: if ROS cannot start a node or take messages.
+        RosError: if ROS cannot start a node or receive messages.
     """
     measurements, types = Measurements(), set(TYPES) - set(IMAGES[1:])
     readers: dict[str, HeaderSubscription] = {}

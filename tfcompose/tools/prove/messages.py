@@ -1,4 +1,4 @@
-"""Messages of sensors as arrays, decoded with rosbags' types, without ROS."""
+"""Decoding of sensor messages into arrays, with rosbags and without ROS."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
+from tfcompose.tools.prove.clouds import EVERY_S, Cloud, cloud_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -15,7 +17,7 @@ IMU = "sensor_msgs/msg/Imu"
 ODOMETRY = "nav_msgs/msg/Odometry"
 IMAGES = ("sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CLOUDS = ("sensor_msgs/msg/LaserScan", "sensor_msgs/msg/PointCloud2")
-#: The types that are read.
+#: The message types that the checks read.
 TYPES = (IMU, ODOMETRY, *CLOUDS, *IMAGES)
 
 _STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -24,14 +26,17 @@ _SECOND_NS = 1_000_000_000
 
 @dataclass(slots=True)
 class MeasuredTopic:
-    """What came on one topic."""
+    """The measurements of a topic."""
 
     name: str
     type: str
     #: The number of messages by the frame in their headers.
     frames: dict[str, int] = field(default_factory=dict)
-    #: Rows of numbers, for the types that are decoded; as ``Imu`` and ``Odometry`` have them.
+    #: A row of numbers for each message of an IMU or of odometry. ``imu_of`` and ``odometry_of``
+    #: read these rows.
     rows: list[tuple[float, ...]] = field(default_factory=list)
+    #: The clouds of a LaserScan or PointCloud2, at most one in ``EVERY_S``.
+    clouds: list[Cloud] = field(default_factory=list)
     #: ``child_frame_id`` of odometry.
     child_frame: str = ""
 
@@ -43,11 +48,11 @@ class MeasuredTopic:
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """An IMU's measurements over time, in its own axes."""
+    """The measurements of an IMU over time, in the axes of the IMU."""
 
     #: In seconds, shape (n,), ascending.
     stamps_s: NDArray[np.float64]
-    #: Specific force in m/s², shape (n, 3): at rest it points up (REP-145).
+    #: The specific force in m/s², shape (n, 3). At rest it points up (REP-145).
     forces: NDArray[np.float64]
     #: Angular velocity in rad/s, shape (n, 3).
     rates: NDArray[np.float64]
@@ -55,7 +60,7 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """A base's motion over time, in its own axes."""
+    """The motion of a base over time, in the axes of the base."""
 
     #: In seconds, shape (n,), ascending.
     stamps_s: NDArray[np.float64]
@@ -65,17 +70,20 @@ class Odometry:
     yaw_rates: NDArray[np.float64]
 
 
-def decode(topic: MeasuredTopic, data: bytes) -> None:
-    """Add a message's numbers to its topic.
+def decode(topic: MeasuredTopic, stamp_ns: int, data: bytes) -> None:
+    """Decode a message, and add its numbers to its topic.
 
     Raises:
-        Exception: whatever the library raises for bytes of another type.
+        Exception: any exception of the library, if the bytes are of another type.
     """
+    stamp_s = stamp_ns / _SECOND_NS
+    if topic.type in CLOUDS:
+        if not topic.clouds or abs(stamp_s - topic.clouds[-1].stamp_s) >= EVERY_S:
+            topic.clouds.append(cloud_of(_STORE.deserialize_cdr(data, topic.type), stamp_s))
+        return
     if topic.type not in {IMU, ODOMETRY}:
         return
     message: Any = _STORE.deserialize_cdr(data, topic.type)
-    stamp = message.header.stamp
-    stamp_s = stamp.sec + stamp.nanosec / _SECOND_NS
     if topic.type == IMU:
         force, rate = message.linear_acceleration, message.angular_velocity
         topic.rows.append((stamp_s, force.x, force.y, force.z, rate.x, rate.y, rate.z))
@@ -86,13 +94,13 @@ def decode(topic: MeasuredTopic, data: bytes) -> None:
 
 
 def imu_of(topic: MeasuredTopic) -> Imu:
-    """Return the measurements of an IMU's topic, those that are numbers."""
+    """Return the finite measurements of an IMU's topic."""
     rows = _array(topic, 7)
     return Imu(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
 
 def odometry_of(topic: MeasuredTopic) -> Odometry:
-    """Return the motion on a topic of odometry, as far as it is numbers."""
+    """Return the finite measurements of a topic with odometry."""
     rows = _array(topic, 4)
     return Odometry(rows[:, 0], rows[:, 1:3], rows[:, 3])
 

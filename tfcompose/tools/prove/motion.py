@@ -1,8 +1,9 @@
-"""Motion that an IMU shares with odometry, by least squares over short intervals.
+"""Relation between an IMU's measurements and odometry, by least squares.
 
-Gravity and the base's accelerations show how the accelerometer's axes are rotated, yaw rates how
-the gyroscope's are. Uncertainties are standard errors from the scatter between stretches of the
-recording, so that noise that is correlated in time does not make them too small.
+Gravity and the accelerations of the base show the rotation of the accelerometer's axes. Yaw rates
+show the rotation of the gyroscope's axes. Measurements are averaged over short intervals. Standard
+errors come from the scatter between stretches of the recording, so that noise that is correlated
+in time does not make them too small.
 """
 
 from __future__ import annotations
@@ -19,16 +20,18 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Measurements are averaged over intervals of this length, in seconds.
+#: The length of the intervals over which measurements are averaged, in seconds.
 INTERVAL_S = 0.1
-#: Fewer intervals than this say nothing.
+#: The smallest number of intervals for an estimate.
 FEWEST = 20
-#: Into this many stretches a recording is divided for the scatter.
+#: The number of stretches into which a recording is divided. The scatter between stretches gives
+#: the standard error.
 STRETCHES = 8
-#: Below these standard deviations a motion does not excite a sensor: rad/s and m/s².
+#: The smallest standard deviations of a motion that is large enough for an estimate, in rad/s and
+#: m/s².
 LEAST_YAW_RATE = 0.08
 LEAST_ACCELERATION = 0.08
-#: Accelerations are those of speeds smoothed over this many intervals.
+#: Accelerations are computed from speeds that are averaged over this many intervals.
 _SMOOTHED = 5
 
 
@@ -43,31 +46,34 @@ class Estimate:
 
     @property
     def length(self) -> float:
-        """The vector's length."""
+        """The length of the vector."""
         return float(np.linalg.norm(self.vector))
 
     @property
     def direction(self) -> Array:
-        """The vector at unit length, shape (3,)."""
+        """The unit vector in the direction of the vector, shape (3,)."""
         return self.vector / max(self.length, 1e-12)
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What an IMU measures of a base's motion; None where the motion excites too little."""
+    """The relation between an IMU's measurements and the motion of the base.
 
-    #: Specific force at rest, in m/s²: it points up.
+    An estimate is None if the motion is too small for it.
+    """
+
+    #: The specific force at rest, in m/s². It points up.
     up: Estimate | None
-    #: Specific force for a unit acceleration forward: it points forward.
+    #: The specific force for a forward acceleration of 1 m/s². It points forward.
     forward: Estimate | None
-    #: Measured rate for a unit yaw rate: it points along the yaw axis.
+    #: The measured rate for a yaw rate of 1 rad/s. It points along the yaw axis.
     yaw_axis: Estimate | None
     #: The standard deviation of the base's yaw rate, in rad/s.
     yaw_rate_std: float = 0.0
 
 
 def motion_of(imu: Imu, odometry: Odometry | None, base_xyz: Array) -> Motion:
-    """Return the motion that an IMU measures at ``base_xyz``, its position in the base in m."""
+    """Return the estimates for an IMU at ``base_xyz``, its position in the base in metres."""
     if len(imu.stamps_s) < FEWEST:
         return Motion(None, None, None)
     if odometry is None or len(odometry.stamps_s) < FEWEST:
@@ -101,9 +107,9 @@ def motion_of(imu: Imu, odometry: Odometry | None, base_xyz: Array) -> Motion:
 
 
 def means(stamps_s: Array, values: Array, edges_s: Array) -> Array:
-    """Return the mean of values of shape (n, k) between neighbouring edges, shape (m - 1, k).
+    """Return the means of values, shape (n, k), between consecutive edges, shape (m - 1, k).
 
-    Between stamps values are the mean of both.
+    Between two stamps, the value is the mean of the values at both stamps.
     """
     steps = np.diff(stamps_s)[:, None]
     areas = np.vstack([np.zeros(values.shape[1]), (values[1:] + values[:-1]) / 2 * steps])
@@ -114,16 +120,17 @@ def means(stamps_s: Array, values: Array, edges_s: Array) -> Array:
 
 
 def _smooth(values: Array) -> Array:
-    """Return moving averages of the rows, which shortens them by ``_SMOOTHED - 1``."""
+    """Return moving averages over ``_SMOOTHED`` rows, which are ``_SMOOTHED - 1`` rows fewer."""
     sums = np.cumsum(np.vstack([np.zeros(values.shape[1]), values]), axis=0)
     smooth: Array = (sums[_SMOOTHED:] - sums[:-_SMOOTHED]) / _SMOOTHED
     return smooth
 
 
 def _accelerations(velocities: Array, yaw_rates: Array, xyz: Array) -> Array:
-    """Return the accelerations forward and left of a point fixed to a base that moves in a plane.
+    """Return the forward and left accelerations of a point on a base that moves in a plane.
 
-    Shape (n, 2), in m/s². dv/dt + ω × v + dω/dt × r + ω × (ω × r).
+    The result has shape (n, 2), in m/s². The acceleration of the point r is dv/dt + ω × v + dω/dt
+    × r + ω × (ω × r).
     """
     (x, y, _), along = xyz, np.gradient(velocities, INTERVAL_S, axis=0)
     angular = np.gradient(yaw_rates, INTERVAL_S)
@@ -133,9 +140,9 @@ def _accelerations(velocities: Array, yaw_rates: Array, xyz: Array) -> Array:
 
 
 def _regress(inputs: Array, outputs: Array) -> list[Estimate]:
-    """Return for each column of inputs the vector by which outputs follow it.
+    """Solve outputs = inputs · vectors by least squares, with a vector for each column of inputs.
 
-    The scatter is that of the solutions without one stretch each (delete-d jackknife).
+    The standard error comes from solutions that each leave out a stretch (delete-d jackknife).
     """
     vectors = np.linalg.lstsq(inputs, outputs, rcond=None)[0]
     stretches = np.array_split(np.arange(len(inputs)), STRETCHES)

@@ -1,10 +1,11 @@
-"""All checks of a robot's sensors, and their findings with edits of the robot file."""
+"""All checks of a robot's sensors, with findings and edits of the robot file."""
 
 from __future__ import annotations
 
 import math
 import posixpath
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,9 +17,13 @@ from tfcompose.foundation.findings import Note, finding
 from tfcompose.foundation.geometry import Pose, quat_from_rpy, rpy_from_quat
 from tfcompose.model.robot import is_optical
 from tfcompose.tools.prove.frame_ids import judge_frame
-from tfcompose.tools.prove.imu import ImuCheck, describe_rotation, matrix_of
-from tfcompose.tools.prove.messages import IMU, ODOMETRY, imu_of, odometry_of
+from tfcompose.tools.prove.imu import ImuCheck
+from tfcompose.tools.prove.messages import CLOUDS, IMU, ODOMETRY, imu_of, odometry_of
 from tfcompose.tools.prove.motion import motion_of
+from tfcompose.tools.prove.overlap import judge_overlap, pairs_of, points_in_base, residual_of
+from tfcompose.tools.prove.ranging import RangingCheck
+from tfcompose.tools.prove.rotations import describe_rotation, matrix_of
+from tfcompose.tools.prove.travel import track_of
 from tfcompose.tools.prove.verdict import CheckResult, SensorVerdict
 
 if TYPE_CHECKING:
@@ -32,21 +37,24 @@ if TYPE_CHECKING:
     from tfcompose.tools.prove.recording import Measurements
 
 
-#: Fitting angles are rounded to this, in radians.
-_STEP_RAD = math.radians(0.1)
+#: The steps to which fitting angles and lengths are rounded, in radians and metres.
+_STEP_RAD, _STEP_M = math.radians(0.1), 0.001
+#: Keys of a mount that set its rotation, and keys that set its position.
+_ROTATIONS = ("rpy", "quat_xyzw", "look", "axis_angle", "matrix", "calibration")
+_POSITIONS = ("xyz", "matrix", "calibration")
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """A robot's declared mounts, and what its sensors measure."""
+    """Compares the declared mounts of a robot with the measurements of its sensors."""
 
     robot: Robot
-    #: The robot's source, with overlays merged over it.
+    #: The robot file with merged overlays.
     source: Source
-    #: The texts of editable files, by their names in spans.
+    #: The texts of editable files, by the file names in spans.
     texts: Mapping[str, str]
     measurements: Measurements
-    #: Sensors or frames to check; empty: all.
+    #: The sensors or frames to check; empty for all.
     only: frozenset[str] = frozenset()
 
     def verdicts(self) -> list[SensorVerdict]:
@@ -61,6 +69,7 @@ class Proof:
             if not self.only or verdict.sensor in self.only
         ]
         received = {verdict.sensor for verdict in verdicts}
+        verdicts += self._overlaps(verdicts, poses, odometry)
         verdicts += [
             SensorVerdict(name, "", CheckResult("data", "cannot tell", "no message came"))
             for name in sorted(self.only or {sensor.name for sensor in self._measuring()})
@@ -69,7 +78,7 @@ class Proof:
         return sorted(verdicts, key=lambda verdict: (verdict.sensor, verdict.topic))
 
     def _measuring(self) -> Iterator[MountedSensor]:
-        """Yield the sensors whose messages can be checked."""
+        """Yield the sensors that have messages to check."""
         kinds = {"imu", "camera", "stereo", "rgbd", "lidar2d", "lidar3d"}
         return (sensor for sensor in self.robot.sensors if sensor.kind in kinds)
 
@@ -77,19 +86,23 @@ class Proof:
         self, topic: MeasuredTopic, poses: dict[str, Pose], odometry: Odometry | None
     ) -> Iterator[SensorVerdict]:
         declared, sensor = self._declared(topic)
-        frame = next((name for name in self.robot.frames if self._is_frame(topic, name)), "")
+        frame = self._frame_of(topic)
         if sensor is None:
             sensor = next((each for each in self.robot.sensors if frame in _frames(each)), None)
         name = sensor.name if sensor else frame or topic.name
         judgements = [judge_frame(self.robot, topic, declared, poses)]
         if topic.type == IMU and frame and judgements[0].answer == "agrees":
             judgements += self._judge_imu(topic, frame, poses, odometry)
+        if topic.type in CLOUDS and frame and judgements[0].answer == "agrees":
+            judgements += self._judge_ranges(topic, frame, poses, odometry)
         for judgement in judgements:
-            found = self._finding(name, topic, judgement, sensor, frame, poses)
-            yield SensorVerdict(name, topic.name, judgement, found)
+            finding = self._finding(name, topic, judgement, sensor, frame, poses)
+            yield SensorVerdict(name, topic.name, judgement, finding)
 
-    def _is_frame(self, topic: MeasuredTopic, name: str) -> bool:
-        return self.robot.final(name) == topic.frame
+    def _frame_of(self, topic: MeasuredTopic) -> str:
+        """Return the declared frame of a topic's messages; empty if there is none."""
+        final = self.robot.final
+        return next((name for name in self.robot.frames if final(name) == topic.frame), "")
 
     def _declared(self, topic: MeasuredTopic) -> tuple[str, MountedSensor | None]:
         """Return the frame that a preset's driver uses on this topic, and the sensor."""
@@ -102,7 +115,7 @@ class Proof:
         return "", None
 
     def _names(self, sensor: MountedSensor, name: str) -> Iterator[str]:
-        """Yield the full names that a driver's topic has, for each of its nodes."""
+        """Yield the full names of a driver's topic, for each node of the driver."""
         process = next((each for each in self.robot.processes if each.name == sensor.driver), None)
         if process is None:
             return
@@ -116,7 +129,10 @@ class Proof:
             yield posixpath.join(posixpath.dirname(full), target)
 
     def _odometry(self) -> Odometry | None:
-        """Return the motion of the base: of several topics, that with the most messages."""
+        """Return the motion of the base.
+
+        If several topics contain odometry, use the topic with the most messages.
+        """
         topics = [
             topic
             for topic in self.measurements.topics.values()
@@ -126,13 +142,13 @@ class Proof:
         return odometry_of(best) if best else None
 
     def _is_of_base(self, topic: MeasuredTopic) -> bool:
-        """Return whether odometry is that of the base, or of what is fixed level above it."""
+        """Return whether odometry moves the base, or a frame that is fixed level to the base."""
         poses = self._base_from_frames()
         names = [name for name in poses if self.robot.final(name) == topic.child_frame]
         return any(abs(poses[name].quat_xyzw[3]) > 1 - 1e-9 for name in names)
 
     def _base_from_frames(self) -> dict[str, Pose]:
-        """Return the poses in the base of frames that are fixed to it and known."""
+        """Return the known poses in the base of frames that are fixed to the base."""
         robot = self.robot
         if robot.base is None:
             return {}
@@ -163,14 +179,71 @@ class Proof:
             return
         pose = poses[frame]
         motion = motion_of(imu_of(topic), odometry, np.array(pose.xyz))
-        code = CATALOGUE["TF650"]
-        limit = self.robot.limits.get("TF650", code.limit[0] if code.limit else 0.0)
+        limit = self._limit("TF650")
         for judgement in ImuCheck(motion, matrix_of(pose.quat_xyzw), limit).judge():
             if odometry is None and judgement.check in {"yaw rate", "heading"}:
                 reason = f"no odometry of {self.robot.base} came"
                 yield replace(judgement, text=reason)
                 continue
             yield judgement
+
+    def _judge_ranges(
+        self, topic: MeasuredTopic, frame: str, poses: dict[str, Pose], odometry: Odometry | None
+    ) -> Iterator[CheckResult]:
+        if frame not in poses:
+            reason = f"{frame} is not fixed to {self.robot.base or 'one base'}"
+            yield CheckResult("floor", "cannot tell", reason)
+            return
+        pose, ground = poses[frame], poses.get(self.robot.ground or "")
+        yield from RangingCheck(
+            topic.clouds,
+            track_of(odometry) if odometry else None,
+            base_from_frame=matrix_of(pose.quat_xyzw),
+            xyz=np.array(pose.xyz),
+            ground_z=ground.xyz[2] if ground else None,
+            limit_rad=self._limit("TF650"),
+            limit_m=self._limit("TF653"),
+        ).judge()
+
+    def _overlaps(
+        self, verdicts: list[SensorVerdict], poses: dict[str, Pose], odometry: Odometry | None
+    ) -> Iterator[SensorVerdict]:
+        """Yield the results for pairs of sensors that see the same surfaces.
+
+        Sensors of which another check differs, or whose floor is unknown, are left out.
+        """
+        checked = {
+            verdict.topic: verdict.sensor
+            for verdict in verdicts
+            if verdict.judgement.check == "floor" and verdict.judgement.answer == "agrees"
+        }
+        for verdict in verdicts:
+            if verdict.judgement.answer == "differs":
+                checked.pop(verdict.topic, None)
+        path = track_of(odometry) if odometry else None
+        for first, second in combinations(sorted(checked), 2):
+            topics = [self.measurements.topics[name] for name in (first, second)]
+            frames = [self._frame_of(topic) for topic in topics]
+            names = (checked[first], checked[second])
+            pairs = pairs_of(topics[0].clouds, topics[1].clouds, path)
+            clouds = [
+                points_in_base(pair, [poses[name] for name in frames], path) for pair in pairs
+            ]
+            judgement = judge_overlap(
+                residual_of(clouds),
+                names,
+                np.array(poses[frames[1]].xyz),
+                self._limit("TF654"),
+                self._limit("TF650"),
+            )
+            sensor = next((each for each in self.robot.sensors if each.name == names[1]), None)
+            problem = self._finding(names[1], topics[1], judgement, sensor, frames[1], poses)
+            yield SensorVerdict(names[1], second, judgement, problem)
+
+    def _limit(self, code: str) -> float:
+        """Return the limit of a code's measurement, in radians or metres."""
+        default = CATALOGUE[code].limit
+        return self.robot.limits.get(code, default[0] if default else 0.0)
 
     def _finding(  # noqa: PLR0913, PLR0917 (what a finding is made of)
         self,
@@ -187,43 +260,48 @@ class Proof:
         notes = [Note(f"{topic.name}, {topic.type}")]
         edge = self._mount_edge(sensor, frame)
         span: Span | None = edge.span if edge else sensor.span if sensor else None
-        if judgement.code != "TF650" or edge is None:
+        rotation, xyz = judgement.base_from_frame_xyzw, judgement.base_from_frame_xyz
+        if edge is not None and judgement.code in {"TF650", "TF653", "TF654"}:
+            span = self._pose_span(edge, _ROTATIONS if judgement.code == "TF650" else _POSITIONS)
+        if edge is None or (rotation is None and xyz is None):
             return finding(judgement.code, message, span, help=judgement.help, notes=notes)
-        span = self._rotation_span(edge)
-        rotation = judgement.base_from_frame_xyzw
-        if rotation is None:
-            advice = judgement.help
-            return finding(judgement.code, message, span, help=advice, notes=notes)
-        base_from_frame = Pose(poses[frame].xyz, rotation)
+        declared = poses[frame]
+        base_from_frame = Pose(xyz or declared.xyz, rotation or declared.quat_xyzw)
         mount = edge.child
         base_from_parent = poses[mount] @ edge.pose.inverse()
-        mount_from_frame = poses[mount].inverse() @ poses[frame]
+        mount_from_frame = poses[mount].inverse() @ declared
         new = base_from_parent.inverse() @ base_from_frame @ mount_from_frame.inverse()
-        new = Pose(edge.pose.xyz, _rounded(new.quat_xyzw))
-        advice = f"{describe_rotation(new.quat_xyzw)} of {mount} in {edge.parent} would fit"
-        advice += judgement.help
+        if xyz is None:
+            new = Pose(edge.pose.xyz, _rounded(new.quat_xyzw))
+            advice = describe_rotation(new.quat_xyzw)
+        else:
+            x, y, z = (round(value / _STEP_M) * _STEP_M for value in new.xyz)
+            new = Pose((x, y, z), edge.pose.quat_xyzw)
+            advice = f"xyz: [{x:.3f}, {y:.3f}, {z:.3f}]"
+        advice += f" of {mount} in {edge.parent} would fit{judgement.help}"
         edits, reason = self._edits(mount, new)
         if reason:
             notes.append(Note(f"--fix leaves it: {reason}"))
         return finding(judgement.code, message, span, help=advice, notes=notes, edits=edits)
 
     def _mount_edge(self, sensor: MountedSensor | None, frame: str) -> Edge | None:
-        """Return the edge that mounts a sensor, or a camera's body."""
+        """Return the edge that mounts a sensor or the body of a camera."""
         child = sensor.mount if sensor else frame
         edge = self.robot.parent_edge(child)
         while edge is not None and is_optical(edge.child):
             edge = self.robot.parent_edge(edge.parent)
         return edge
 
-    def _rotation_span(self, edge: Edge) -> Span:
-        for key in ("rpy", "quat_xyzw", "look", "axis_angle", "matrix", "calibration"):
+    def _pose_span(self, edge: Edge, keys: tuple[str, ...]) -> Span:
+        """Return the span of the first existing key, or the span of the mount."""
+        for key in keys:
             span = self.source.exact_span((*edge.entry, key))
             if span is not None:
                 return span
         return edge.span
 
     def _edits(self, child: str, pose: Pose) -> tuple[tuple[Edit, ...], str]:
-        """Return the edits that give a frame this pose in its parent, or why there are none."""
+        """Return the edits that set a frame's pose in its parent, or why there are none."""
         try:
             change = change_of(self.robot, self.source, self.texts, child, pose)
         except ImmovableError as error:
@@ -234,7 +312,7 @@ class Proof:
 
 
 def _rounded(quat_xyzw: Quaternion) -> Quaternion:
-    """Return the rotation with roll, pitch and yaw rounded to what a check can tell."""
+    """Return the rotation with roll, pitch and yaw rounded to ``_STEP_RAD``."""
     roll, pitch, yaw = (round(angle / _STEP_RAD) * _STEP_RAD for angle in rpy_from_quat(quat_xyzw))
     return quat_from_rpy(roll, pitch, yaw)
 

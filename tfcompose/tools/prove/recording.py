@@ -1,4 +1,4 @@
-"""Measurements of sensors, by topic, and those of a bag."""
+"""Measurements of sensors by topic, and the reader of a bag."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 class Measurements:
-    """What came on topics of sensors, by topic."""
+    """The measurements of all sensors, by topic."""
 
     def __init__(self) -> None:
         self.topics: dict[str, MeasuredTopic] = {}
-        #: Messages that are not of their topic's type, by topic.
+        #: The number of messages that do not have their topic's type, by topic.
         self.malformed: dict[str, int] = {}
 
     def take(self, name: str, type_: str, data: bytes) -> None:
@@ -27,7 +27,7 @@ class Measurements:
         try:
             if header is None or topic.type != type_:
                 raise ValueError(type_)  # noqa: TRY301 (as if it could not be decoded)
-            decode(topic, data)
+            decode(topic, header[1], data)
         except Exception:  # noqa: BLE001 (rosbags raises anything for bytes of another type)
             self.malformed[name] = self.malformed.get(name, 0) + 1
             return
@@ -35,10 +35,12 @@ class Measurements:
 
 
 def read_bag(path: str, stop: Stop) -> Measurements:
-    """Return what a bag holds, up to a signal.
+    """Return the measurements in a bag.
+
+    A signal ends the reading early.
 
     Raises:
-        BagError: if it cannot be read.
+        BagError: if the bag cannot be read.
     """
     measurements = Measurements()
     for message in Recording(path).messages_of_types(TYPES):

@@ -1,4 +1,4 @@
-"""Prove tool: declared mounts against what sensors measure."""
+"""The tool ``prove``: it compares declared mounts with measurements of sensors."""
 
 from tfcompose.foundation.tool import Command, Tool
 

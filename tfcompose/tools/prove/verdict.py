@@ -1,4 +1,4 @@
-"""Verdicts on a sensor: its measurements agree, differ, or cannot tell."""
+"""Results of the checks of a sensor."""
 
 from __future__ import annotations
 
@@ -7,42 +7,46 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
-    from tfcompose.foundation.geometry import Quaternion
+    from tfcompose.foundation.geometry import Quaternion, Vector
 
 Answer = Literal["agrees", "differs", "cannot tell"]
 
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """The answer of one check about one topic."""
+    """The result of a check for a topic."""
 
     check: str
     answer: Answer
-    #: The measured value with its uncertainty; why it differs; or why the check cannot tell.
+    #: The measured value with its standard error, the reason why it differs, or the reason why the
+    #: check cannot tell.
     text: str
-    #: The code of the finding, if it differs.
+    #: The code of the finding, if the measurement differs.
     code: str = ""
-    #: The way out, if it differs.
+    #: The help of the finding, if the measurement differs.
     help: str = ""
-    #: The rotation of the message's frame in the base that fits; None: no rotation fits, or it is
-    #: not known.
+    #: The fitting rotation of the message's frame in the base; None if no rotation fits, or if it
+    #: is unknown.
     base_from_frame_xyzw: Quaternion | None = None
+    #: The fitting position of the message's frame in the base, in metres; None if the declared
+    #: position fits.
+    base_from_frame_xyz: Vector | None = None
     #: Measured numbers by name, in SI units.
     values: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class SensorVerdict:
-    """A judgement with its sensor, topic and finding."""
+    """The result of a check, with its sensor, topic and finding."""
 
     sensor: str
     topic: str
     judgement: CheckResult
-    #: The finding if it differs.
+    #: The finding, if the measurement differs.
     finding: Finding | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the result as JSON data."""
         judgement = self.judgement
         return {
             "sensor": self.sensor,

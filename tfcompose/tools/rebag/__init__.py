@@ -1,1 +1,1 @@
-"""Corrected recordings: bags rewritten with the poses of a robot file."""
+"""Correction of recordings: rewriting a bag with the poses of a robot file."""

@@ -1,7 +1,7 @@
-"""A bag as files: a folder with metadata.yaml, or a single .mcap or .db3 file.
+"""Reading and writing of bags: a folder with metadata.yaml, or a single .mcap or .db3 file.
 
-The new bag is written next to its final place, under another name, and moved there when it is
-complete.
+A new bag has a temporary name in its final folder while it is written. It gets its final name when
+it is complete.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ T = TypeVar("T")
 METADATA = "metadata.yaml"
 _INFORMATION = "rosbag2_bagfile_information"
 _ZSTD = ".zstd"
-#: SQLite's messages when the new file cannot be written, and the system's error numbers.
+#: SQLite's messages when it cannot write the new file, with the system's error numbers.
 _ERRNO = {"database or disk is full": errno.ENOSPC, "disk I/O error": errno.EIO}
 
 
@@ -48,14 +48,14 @@ class Bag:
     """A bag on disk."""
 
     path: Path
-    #: Its files in order, relative to its folder.
+    #: The bag's files in order, relative to its folder.
     files: tuple[str, ...]
     #: The contents of metadata.yaml below ``rosbag2_bagfile_information``; None for a single file.
     information: dict[str, Any] | None = field(default=None)
 
     @property
     def folder(self) -> Path:
-        """The folder with its files."""
+        """The folder with the bag's files."""
         return self.path if self.information is not None else self.path.parent
 
     @property
@@ -65,16 +65,16 @@ class Bag:
 
     @property
     def compresses_messages(self) -> bool:
-        """Whether each message is compressed on its own."""
+        """Whether each message is compressed separately."""
         mode = str((self.information or {}).get("compression_mode", ""))
         return mode.lower() == "message"
 
 
 def bag_at(path: Path) -> Bag:
-    """Return the bag in a folder, or the one that a single file is.
+    """Return the bag in a folder or in a single file.
 
     Raises:
-        BagError: if there is none, or it is of a kind that cannot be written.
+        BagError: if there is no bag, or tfcompose cannot write this kind of bag.
     """
     if path.name == METADATA:
         path = path.parent
@@ -108,10 +108,10 @@ def _information_in(file: Path) -> dict[str, Any]:
 
 
 def _file_names(information: dict[str, Any], path: Path) -> Iterator[str]:
-    """Yield the names of the bag's files, which are all in its folder.
+    """Yield the names of the bag's files.
 
     Raises:
-        BagError: if one is not, or is none that can be written.
+        BagError: if a file is missing or outside the bag's folder, or is not a .mcap or .db3 file.
     """
     names = information.get("relative_file_paths")
     if not isinstance(names, list) or not names:
@@ -125,7 +125,7 @@ def _file_names(information: dict[str, Any], path: Path) -> Iterator[str]:
 
 
 def note_static(bag: Bag, rewrite: Rewrite) -> None:
-    """Let the corrections know every recorded fixed edge, and how the bag stores messages.
+    """Pass every recorded fixed edge to the corrections, and the QoS and types of topics.
 
     Raises:
         BagError: if the bag cannot be read.
@@ -139,7 +139,7 @@ def note_static(bag: Bag, rewrite: Rewrite) -> None:
     by_topic = {topics[1]: each for topics, each in rewrite.corrections.items()}
     rewrite.types = _types(bag)
     for channel, data in _tf_messages(bag, rewrite, by_topic):
-        with suppress(ValueError):  # counted when it is copied
+        with suppress(ValueError):  # the copy counts such messages
             by_topic[channel.topic].note_static(data)
 
 
@@ -155,7 +155,7 @@ def _types(bag: Bag) -> dict[str, str]:
 
 @contextmanager
 def _reader(bag: Bag) -> Iterator[Reader]:
-    """Open the bag, and say what is wrong with it in one sentence."""
+    """Open the bag; raise a BagError with a single sentence if it is damaged."""
     try:
         with Reader(bag.path) as reader:
             yield reader
@@ -166,7 +166,7 @@ def _reader(bag: Bag) -> Iterator[Reader]:
 
 
 def check_bag(bag: Bag, rewrite: Rewrite) -> None:
-    """Feed the bag's TF to the corrections, and write nothing.
+    """Pass the bag's TF to the corrections without writing a file.
 
     Raises:
         BagError: if the bag cannot be read.
@@ -181,7 +181,7 @@ def check_bag(bag: Bag, rewrite: Rewrite) -> None:
 def _tf_messages(
     bag: Bag, rewrite: Rewrite, topics: Collection[str]
 ) -> Iterator[tuple[RecordedTopic, bytes]]:
-    """Yield the TFMessages on these topics, in the order of their times."""
+    """Yield the TFMessages of these topics in the order of their times."""
     with _reader(bag) as reader:
         connections = [
             connection
@@ -197,9 +197,8 @@ def write_corrected(bag: Bag, target: Path, rewrite: Rewrite) -> Counter[str]:
     """Write the corrected bag, and return its number of messages by topic.
 
     Raises:
-        BagError: if a file of the bag is damaged.
-        OSError: if the new bag cannot be written.
-        InterruptedRewrite: if a signal came. Nothing is left of the new bag, as after an error.
+        BagError: if a file of the bag is damaged. OSError: if the new bag cannot be written.
+        InterruptedRewrite: if a signal came. As after an error, nothing is left of the new bag.
     """
     counts: Counter[str] = Counter()
     with _new_at(target, is_folder=bag.information is not None) as new:
@@ -215,7 +214,7 @@ def write_corrected(bag: Bag, target: Path, rewrite: Rewrite) -> Counter[str]:
 
 
 def _qos(bag: Bag) -> dict[str, str]:
-    """Return the QoS of each topic's publishers, in whichever file of the bag it is."""
+    """Return the QoS of each topic's publishers, from the files of the bag."""
     qos: dict[str, str] = {}
     for name in bag.files:
         file = bag.folder / name
@@ -225,7 +224,7 @@ def _qos(bag: Bag) -> dict[str, str]:
 
 
 def _read(source: Path, read: Callable[[Path], T]) -> T:
-    """Return what is read from a file of the bag.
+    """Return the result of ``read`` for a file of the bag.
 
     Raises:
         BagError: if it is damaged.
@@ -238,7 +237,7 @@ def _read(source: Path, read: Callable[[Path], T]) -> T:
 
 @contextmanager
 def _new_at(target: Path, *, is_folder: bool) -> Iterator[Path]:
-    """Give a place next to the target, and move it there if all goes well."""
+    """Yield a temporary path next to the target; rename it to the target on success."""
     staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
     new = staging / target.name
     try:
@@ -282,7 +281,7 @@ def _rewrite_compressed(source: Path, target: Path, rewrite: Rewrite) -> Counter
 
 
 def _write_metadata(bag: Bag, file: Path, per_file: list[Counter[str]], rewrite: Rewrite) -> None:
-    """Write metadata.yaml with the new numbers of messages and where they come from."""
+    """Write metadata.yaml with the new numbers of messages and the origin of the bag."""
     information = dict(bag.information or {})
     counts = sum(per_file, Counter())
     information["message_count"] = counts.total()

@@ -1,9 +1,9 @@
 """Copy a recording with the poses of a robot file.
 
-Write the bag IN to OUT with the fixed edges of ROBOT: /tf_static has the robot file's poses from
-the start of each file, and fixed edges leave /tf. Moving edges and all other messages stay, byte
-for byte, with their times and order. Frames inside a sensor keep the recorded pose if the file
-knows only the vendor's nominal one. With --check nothing is written.
+Write the bag IN to OUT with the fixed edges of ROBOT. In OUT, each file begins with the robot
+file's poses on /tf_static, and /tf contains no fixed edges. Keep the bytes, times and order of
+moving edges and all other messages. Keep the recorded poses of frames inside a sensor if the robot
+file contains only the vendor's nominal poses. With --check, write nothing.
 """
 
 from __future__ import annotations
@@ -33,10 +33,8 @@ if TYPE_CHECKING:
     from tfcompose.tools.rebag.rewriting import Rewrite
 
 
-def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument("bag", metavar="IN", help="a rosbag2 folder, .mcap or .db3")
-    parser.add_argument("out", metavar="OUT", nargs="?", help="the new bag, of the same kind")
+def add_with(parser: ArgumentParser) -> None:
+    """Add --with, which names the robot file, and the options that change its variant."""
     parser.add_argument(
         "--with",
         dest="file",
@@ -45,6 +43,13 @@ def arguments(parser: ArgumentParser) -> None:
         help="the robot file with the right poses, or its built plan.json",
     )
     add_variant(parser)
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``rebag``."""
+    parser.add_argument("bag", metavar="IN", help="a rosbag2 folder, .mcap or .db3")
+    parser.add_argument("out", metavar="OUT", nargs="?", help="the new bag, of the same kind")
+    add_with(parser)
     parser.add_argument(
         "--rename",
         action="append",
@@ -94,10 +99,10 @@ def run(arguments: Namespace) -> int:
 
 
 def _target(path: Path) -> Path:
-    """Return where the new bag goes.
+    """Return the path of the new bag.
 
     Raises:
-        SystemExit: after saying that it cannot go there.
+        SystemExit: after printing why the bag cannot be written there.
     """
     from tfcompose.foundation.reading import exists, is_folder
 
@@ -115,10 +120,10 @@ def _unwritable(path: str, reason: str, advice: str = "") -> Finding:
 
 
 def _rewrite(arguments: Namespace, plan: Plan, stop: Stop) -> Rewrite:
-    """Return what is to change in the bag.
+    """Return the changes of the bag.
 
     Raises:
-        SystemExit: after saying which option is wrong.
+        SystemExit: after printing which option is wrong.
     """
     from tfcompose.tools.rebag.correction import corrections_of
     from tfcompose.tools.rebag.messages import MessageEditor
@@ -137,7 +142,7 @@ def _camera_infos(arguments: Namespace) -> dict[str, CameraInfo]:
     """Return the calibrations of --camera-info by topic.
 
     Raises:
-        SystemExit: after saying which files hold none.
+        SystemExit: after printing which files contain no calibration.
     """
     from tfcompose.cli.reading import read_text
     from tfcompose.foundation.findings import RejectedError, finding
@@ -158,7 +163,7 @@ def _camera_infos(arguments: Namespace) -> dict[str, CameraInfo]:
 
 
 def _provenance(arguments: Namespace, plan: Plan) -> dict[str, str]:
-    """Return what the new bag's metadata says about its origin."""
+    """Return the entries about the bag's origin for the metadata of the new bag."""
     from tfcompose.foundation.reading import is_file, read_bytes
 
     file = Path(arguments.file)
@@ -168,8 +173,8 @@ def _provenance(arguments: Namespace, plan: Plan) -> dict[str, str]:
         "tfcompose_source": Path(arguments.bag).resolve().name,
         "tfcompose_options": json.dumps(
             {
-                "profiles": arguments.profiles,
-                "overlays": arguments.overlays,
+                "profiles": plan.profiles,
+                "overlays": plan.overlays,
                 "rename": arguments.rename,
                 "only_declared": arguments.only_declared,
             }
@@ -182,13 +187,13 @@ def _provenance(arguments: Namespace, plan: Plan) -> dict[str, str]:
 
 
 def _corrected(path: Path, target: Path | None, rewrite: Rewrite) -> Counter[str] | None:
-    """Write the corrected bag, and return its number of messages by topic: none if checked.
+    """Write the corrected bag, and return its number of messages by topic.
 
-    None: a signal ended it.
+    Without a target, only check the bag, and return no topics. Return None if a signal ended the
+    work.
 
     Raises:
-        BagError: if the bag is damaged.
-        OSError: if the new one cannot be written.
+        BagError: if the bag is damaged. OSError: if the new bag cannot be written.
     """
     from tfcompose.tools.rebag.bag import bag_at, check_bag, note_static, write_corrected
     from tfcompose.tools.rebag.rewriting import InterruptedRewrite
@@ -280,10 +285,10 @@ def _lines(changes: list[EdgeChange]) -> Iterator[str]:
 
 
 def warnings_of(unknown: Mapping[str, str], malformed: Mapping[str, int]) -> list[Finding]:
-    """Return what may still be wrong in the new bag.
+    """Return findings about messages that could not be corrected.
 
-    ``unknown`` has the types of topics that nothing defines, ``malformed`` the number of messages
-    that are no TFMessages, by topic.
+    ``unknown`` contains the message types without a definition, by topic. ``malformed`` contains
+    the numbers of messages that are not TFMessages, by topic.
     """
     from tfcompose.foundation.findings import finding
 

@@ -1,8 +1,9 @@
-"""Correction of recorded TF: which transforms a bag loses, keeps and gains.
+"""Correction of recorded TF with the fixed edges of a robot file.
 
-A fixed edge of the robot file replaces the recorded one. The frames inside a sensor are an
-exception where the file knows only the vendor's nominal pose: there the recorded pose comes from
-the device's own calibration, so it stays, and the nominal one is added only if none was recorded.
+A fixed edge of the robot file replaces the recorded edge. A frame inside a sensor is an exception,
+if the robot file contains only the vendor's nominal pose. The recorded pose of such a frame stays,
+because it comes from the calibration of the device. The nominal pose is added only if the bag
+contains no pose.
 """
 
 from __future__ import annotations
@@ -21,55 +22,58 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan, PlanEdge
     from tfcompose.model.plan.topics import Topics
 
-#: What happens to an edge of the bag or of the robot file.
+#: The kind of change of an edge.
 ChangeKind = Literal["moved", "equal", "parent", "added", "removed from /tf", "dropped"]
 
 
 class EdgeChange(NamedTuple):
-    """What becomes of one edge."""
+    """The change of an edge."""
 
-    #: ``parent → child``, by the names in the corrected bag.
+    #: ``parent → child``, with the names in the corrected bag.
     edge: str
     kind: ChangeKind
-    #: How far the recorded pose was from the robot file's; None unless ``moved`` or ``equal``.
+    #: The distance between the recorded pose and the robot file's pose; None unless the kind is
+    #: ``moved`` or ``equal``.
     offset: Offset | None = None
-    #: The recorded parent, if it is another one.
+    #: The recorded parent, if it is not the robot file's parent.
     parent: str | None = None
-    #: How many transforms leave the bag.
+    #: The number of transforms that are removed from the bag.
     transforms: int = 0
 
 
 @dataclass
 class TFCorrection:
-    """Correction of the TFMessages of one pair of topics (moving, fixed).
+    """Corrects the TFMessages of a pair of topics (moving, fixed).
 
-    ``note_static`` must have seen every message of the fixed topic before ``opening``.
+    Pass every message of the fixed topic to ``note_static`` before you call ``opening``.
     """
 
     topics: Topics
-    #: Fixed edges whose pose the robot file decides, by child.
+    #: Fixed edges whose pose in the robot file replaces the recorded pose, by child.
     fixed: Mapping[str, PlanEdge]
-    #: Fixed edges whose recorded pose is better, by child.
+    #: Fixed edges whose recorded pose stays, by child.
     nominal: Mapping[str, PlanEdge]
     #: Parents that the robot file allows, by child.
     declared: Mapping[str, frozenset[str]]
     #: New names of frames, by old name.
     renames: Mapping[str, str]
-    #: Drop edges that the robot file does not declare.
+    #: Whether to drop edges that the robot file does not declare.
     only_declared: bool = False
-    #: Recorded fixed edges as they stay, by child; each file of a bag begins with those so far.
+    #: Recorded fixed edges that stay, by child. Each file of a bag begins with the edges of
+    #: earlier files.
     kept: dict[str, SentTransform] = field(default_factory=dict)
-    #: Transforms that left the topic of moving edges, and dropped ones, by edge.
+    #: The numbers of transforms that were removed from the topic of moving edges, and of dropped
+    #: transforms, by edge.
     left_moving: Counter[str] = field(default_factory=Counter)
     dropped: Counter[str] = field(default_factory=Counter)
     _recorded: dict[str, SentTransform] = field(default_factory=dict)
     _decoder: Decoder = field(default_factory=Decoder)
 
     def note_static(self, data: bytes) -> None:
-        """Note a recorded message of the fixed topic, before anything is corrected.
+        """Store the edges of a recorded message of the fixed topic, before the correction.
 
         Raises:
-            ValueError: if it is no TFMessage.
+            ValueError: if it is not a TFMessage.
         """
         for transform in decode(data):
             renamed = self._renamed(transform)
@@ -78,8 +82,8 @@ class TFCorrection:
     def opening(self, stamp_ns: int) -> bytes | None:
         """Return the message of the fixed topic that a file of the bag begins with.
 
-        It has the robot file's edges and the recorded fixed edges so far, with this stamp in
-        nanoseconds. None: there are none.
+        It contains the robot file's edges and the recorded fixed edges of earlier files.
+        ``stamp_ns`` is their stamp. Return None if there are no such edges.
         """
         missing = {
             child: edge for child, edge in self.nominal.items() if child not in self._recorded
@@ -89,12 +93,12 @@ class TFCorrection:
         return encode(sent) if sent else None
 
     def corrected(self, data: bytes, *, static: bool) -> bytes | None:
-        """Return a recorded TFMessage as it is to be: the same bytes where nothing changes.
+        """Return the corrected bytes of a recorded TFMessage; the same bytes if nothing changes.
 
-        None: nothing is left of it. ``static`` says that it is of the fixed topic.
+        Return None if no transform is left. ``static`` is True for messages of the fixed topic.
 
         Raises:
-            ValueError: if it is no TFMessage.
+            ValueError: if it is not a TFMessage.
         """
         if not static and not self._touches(data):
             return data
@@ -111,7 +115,7 @@ class TFCorrection:
         return encode(after) if after else None
 
     def changes(self) -> list[EdgeChange]:
-        """Return what becomes of each edge that does not stay as it is, and of the fixed ones."""
+        """Return the changes of edges, and an entry for each fixed edge of the robot file."""
         changes = [self._change_of(edge) for edge in self.fixed.values()]
         changes += [
             EdgeChange(edge.name, "added")
@@ -137,7 +141,7 @@ class TFCorrection:
         return EdgeChange(edge.name, "moved" if offset.beyond(_EQUAL) else "equal", offset)
 
     def _touches(self, data: bytes) -> bool:
-        """Return whether a message of the moving topic may have to change."""
+        """Return whether a message of the moving topic may need a change."""
         for row in self._decoder.rows(data):
             parent, child = plain_name(row[0]), plain_name(row[1])
             if child in self.fixed or parent in self.renames or child in self.renames:
@@ -171,7 +175,8 @@ class TFCorrection:
         )
 
 
-#: Recorded poses are doubles that went through one quaternion: anything more is a difference.
+#: The largest difference of equal poses. A recorded pose consists of doubles and a quaternion, so
+#: it differs only by rounding.
 _EQUAL = Offset(1e-6, 1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Rewriting of an MCAP file, record by record, with the library mcap."""
+"""Rewriting of an MCAP file, record by record, with the library ``mcap``."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 #: The metadata record in which rosbag2 keeps a copy of metadata.yaml, and the key in it.
 _ROSBAG2, _SERIALIZED = "rosbag2", "serialized_metadata"
-#: The metadata record of this program.
+#: The name of tfcompose's metadata record.
 PROVENANCE = "tfcompose"
 _COMPRESSION = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4}
 
 
 def rewrite_mcap(source: Path, target: Path, rewrite: Rewrite) -> Counter[str]:
-    """Write an MCAP file anew, and return the number of messages by topic.
+    """Write the corrected copy of an MCAP file, and return the number of messages by topic.
 
-    Chunks and their compression are as in the source. Messages keep their order, times and
+    The copy has the source's chunk size and compression. Messages keep their order, times and
     sequence numbers.
 
     Raises:
@@ -59,7 +59,9 @@ def rewrite_mcap(source: Path, target: Path, rewrite: Rewrite) -> Counter[str]:
 
 
 def qos_in_mcap(file: Path) -> dict[str, str]:
-    """Return the QoS of each topic's publishers as the file stores it, if it has a summary.
+    """Return the QoS of each topic's publishers in the file's format.
+
+    The result is empty if the file has no summary.
 
     Raises:
         McapError: if the file is damaged.
@@ -72,12 +74,15 @@ def qos_in_mcap(file: Path) -> dict[str, str]:
 
 
 def _finish(writer: Any) -> None:
-    """Write the index; the library does not say this method's types."""
+    """Finish the file and write its index.
+
+    The library's method has no type annotations.
+    """
     writer.finish()
 
 
 def _writer_like(old: BinaryIO, new: BinaryIO) -> Writer:
-    """Return a writer that keeps messages as the file does: in chunks of its size, compressed."""
+    """Return a writer with the chunk size and the compression of a file."""
     for record in StreamReader(old, emit_chunks=True).records:
         if isinstance(record, Chunk):
             compression = _COMPRESSION.get(record.compression, CompressionType.NONE)
@@ -90,7 +95,7 @@ def _writer_like(old: BinaryIO, new: BinaryIO) -> Writer:
 
 
 class _McapRewrite:
-    """One file on its way into another."""
+    """Copies the records of a file to a writer, with corrections."""
 
     def __init__(self, rewrite: Rewrite, writer: Writer, summary: Summary | None) -> None:
         self._rewrite = rewrite
@@ -98,13 +103,13 @@ class _McapRewrite:
         self._summary = summary
         self._schemas: dict[int, tuple[int, Schema | None]] = {0: (0, None)}
         self._channels: dict[int, tuple[int, str, Edit | None]] = {}
-        #: Channels that were registered for the opening messages, by topic.
+        #: Ids of channels that were registered for the opening messages, by topic.
         self._opened: dict[str, int] = {}
         self._is_open = False
         self.counts: Counter[str] = Counter()
 
     def open(self) -> None:
-        """Write the opening messages, if the file's summary says when it begins."""
+        """Write the opening messages, if the file has a summary with the start time."""
         statistics = self._summary and self._summary.statistics
         if statistics and statistics.message_count:
             self._open_at(statistics.message_start_time)
@@ -116,7 +121,7 @@ class _McapRewrite:
             self._write(channel.topic, id_, data, stamp_ns, stamp_ns, 0)
 
     def _register(self, channel: RecordedTopic) -> int:
-        """Register a channel for opening messages, as the file itself has it if it does."""
+        """Register a channel for opening messages; use the file's own channel if there is one."""
         for recorded in self._summary.channels.values() if self._summary else ():
             schema = self._summary.schemas.get(recorded.schema_id) if self._summary else None
             if recorded.topic == channel.topic and schema and schema.name == channel.type:
@@ -136,11 +141,11 @@ class _McapRewrite:
         return int(self._writer.register_channel(channel.topic, "cdr", id_, metadata))
 
     def take(self, record: object) -> None:
-        """Write a record as it is to be; what the writer makes itself is passed over."""
+        """Write a corrected record; skip records that the writer creates itself."""
         if isinstance(record, Message):
             self._take_message(record)
         elif isinstance(record, Schema):
-            if record.id in self._schemas:  # each chunk repeats it
+            if record.id in self._schemas:  # repeated in each chunk
                 return
             id_ = self._writer.register_schema(record.name, record.encoding, record.data)
             self._schemas[record.id] = id_, record
@@ -162,7 +167,7 @@ class _McapRewrite:
             self._write(topic, id_, data, message.log_time, message.publish_time, message.sequence)
 
     def _take_channel(self, record: ChannelRecord) -> None:
-        if record.id in self._channels:  # each chunk repeats it
+        if record.id in self._channels:  # repeated in each chunk
             return
         schema_id, schema = self._schemas[record.schema_id]
         channel = RecordedTopic(record.topic, "")
@@ -179,7 +184,7 @@ class _McapRewrite:
     def _take_metadata(self, record: Metadata) -> None:
         entries = dict(record.metadata)
         if record.name == _ROSBAG2:
-            entries.pop(_SERIALIZED, None)  # metadata.yaml has what is true of the new bag
+            entries.pop(_SERIALIZED, None)  # it describes the old bag
         if entries:
             self._writer.add_metadata(record.name, entries)
 

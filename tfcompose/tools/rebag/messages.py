@@ -1,4 +1,4 @@
-"""Changes inside other messages than TF: names of frames in headers, and camera calibrations."""
+"""Changes of frame names and camera calibrations in messages other than TF."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ if TYPE_CHECKING:
     from tfcompose.tools.rebag.recorded_topic import RecordedTopic
 
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
-#: Fields that name a frame outside of a header, as nav_msgs/Odometry has one.
+#: Fields that contain a frame name, in headers and outside, as in nav_msgs/Odometry.
 _FRAME_FIELDS = frozenset({"frame_id", "child_frame_id"})
 
 
 class CameraInfoError(Exception):
-    """Raised when a file holds no camera calibration; the message is one sentence."""
+    """Raised if a file contains no camera calibration; the message is a sentence."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraInfo:
-    """A calibration as ROS's camera_calibration writes it, in pixels (sensor_msgs/CameraInfo)."""
+    """A calibration of ROS's camera_calibration, in pixels (sensor_msgs/CameraInfo)."""
 
     width: int
     height: int
     distortion_model: str
-    #: Distortion coefficients.
+    #: The distortion coefficients.
     d: tuple[float, ...]
-    #: 3×3 camera matrix, 3×3 rectification and 3×4 projection, row by row.
+    #: The 3×3 camera matrix, the 3×3 rectification matrix and the 3×4 projection matrix, row by
+    #: row.
     k: tuple[float, ...]
     r: tuple[float, ...]
     p: tuple[float, ...]
@@ -44,7 +45,7 @@ def camera_info_in(text: str) -> CameraInfo:
     """Return the calibration in a file of camera_calibration or camera_info_manager.
 
     Raises:
-        CameraInfoError: if it holds none.
+        CameraInfoError: if the file contains none.
     """
     try:
         document = yaml.safe_load(text)
@@ -80,13 +81,13 @@ class MessageEditor:
     renames: Mapping[str, str]
     #: Calibrations by topic.
     camera_infos: Mapping[str, CameraInfo]
-    #: Topics whose frames were not renamed, with their type: its definition is unknown.
+    #: Topics whose frames were not renamed, with their type, because the type has no definition.
     unknown: dict[str, str] = field(default_factory=dict)
-    #: How many messages of each topic changed.
+    #: The number of changed messages, by topic.
     changed: Counter[str] = field(default_factory=Counter)
 
     def editor_of(self, channel: RecordedTopic) -> Callable[[bytes], bytes] | None:
-        """Return what changes a message of the topic; None if its messages stay as they are."""
+        """Return a function that changes a message of the topic; None if no message changes."""
         info = self.camera_infos.get(channel.topic)
         if channel.type != CAMERA_INFO:
             info = None
@@ -116,13 +117,13 @@ class MessageEditor:
 
 @dataclass(frozen=True, slots=True)
 class Codec:
-    """Definitions of a message type and of the types in it."""
+    """The definitions of a message type and of the types that it contains."""
 
     store: Typestore
     _has_frame: dict[str, bool] = field(default_factory=dict)
 
     def names_a_frame(self, type_: str) -> bool:
-        """Return whether messages of the type hold the name of a frame, at any depth."""
+        """Return whether messages of the type contain a frame name, at any depth."""
         if type_ not in self._has_frame:
             self._has_frame[type_] = False
             self._has_frame[type_] = any(
@@ -132,7 +133,7 @@ class Codec:
         return self._has_frame[type_]
 
     def rename(self, message: Any, type_: str, renames: Mapping[str, str]) -> bool:
-        """Rename frames in a message, and return whether there were any."""
+        """Rename frames in a message; return whether the message changed."""
         changed = False
         for name, inner in self._fields(type_):
             value = getattr(message, name)
@@ -148,15 +149,15 @@ class Codec:
         return changed
 
     def _fields(self, type_: str) -> list[tuple[str, str | None]]:
-        """Return the fields of a type, each with the name of its type or of its elements'."""
+        """Return the fields of a type, each with the type of the field or of its elements."""
         _, fields = self.store.fielddefs[type_]
         return [(name, _type_name(kind)) for name, kind in fields]
 
 
 def codec_of(channel: RecordedTopic) -> Codec | None:
-    """Return the definitions of a channel's messages: the bag's, or else those of ROS 2 Jazzy.
+    """Return the definitions of a channel's messages, from the bag or from ROS 2 Jazzy.
 
-    None: neither has the type.
+    Return None if neither defines the type.
     """
     if channel.definition:
         store = get_typestore(Stores.EMPTY)
@@ -186,7 +187,7 @@ def _type_name(kind: Any) -> str | None:
 
 
 def _set_camera_info(message: Any, info: CameraInfo) -> bool:
-    """Put the calibration into a CameraInfo; its header, binning and region stay."""
+    """Write the calibration into a CameraInfo; keep its header, binning and region."""
     import numpy as np  # noqa: PLC0415 (as the library has arrays)
 
     values: dict[str, Any] = {

@@ -1,8 +1,9 @@
 """Play a recording with the fixed edges of a robot file.
 
-Publish the robot file's fixed edges, latched, and run `ros2 bag play BAG`, which plays the
-recorded ones on other topics. Recorded fixed edges that the robot file does not declare stay.
-With --print nothing starts. Without `ros2`, play the bag yourself as printed; Ctrl-C ends it.
+Publish the robot file's fixed edges as latched messages, and run `ros2 bag play BAG` with the
+recorded fixed edges on other topics. Also publish recorded fixed edges that the robot file does
+not declare. With --print, print the command and start nothing. If `ros2` is not installed, print
+the command, so that you can run it yourself; Ctrl-C then ends the publishing.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_variant
 from tfcompose.cli.terminal import INTERRUPTED, print_findings, reject
+from tfcompose.tools.rebag.command import add_with
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -29,26 +30,24 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
     from tfcompose.tools.rebag.rewriting import Rewrite
 
-#: The player is asked this often whether it has ended, in seconds.
+#: The interval at which the end of the player is checked, in seconds.
 _POLL_S = 0.1
-#: The player gets this long to end after a Ctrl-C in its terminal, and after SIGINT, in seconds.
+#: The time in seconds in which the player must end, after Ctrl-C in its terminal and again after
+#: SIGINT.
 _END_S = 2.0
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
+    """Add the arguments of ``play``."""
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 folder, .mcap or .db3")
     parser.add_argument(
-        "options", nargs="*", metavar="OPTION", help="after --: options for ros2 bag play"
+        "options",
+        nargs="*",
+        default=[],
+        metavar="OPTION",
+        help="after --: options for ros2 bag play",
     )
-    parser.add_argument(
-        "--with",
-        dest="file",
-        required=True,
-        metavar="FILE|PLAN",
-        help="the robot file with the right poses, or its built plan.json",
-    )
-    add_variant(parser)
+    add_with(parser)
     parser.add_argument(
         "--print",
         dest="only_print",
@@ -58,7 +57,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Play; return the exit code of `ros2 bag play`, or 0 after --print."""
+    """Play the bag; return the exit code of `ros2 bag play`, or 0 after --print."""
     from tfcompose.cli.live import from_bag, recording_day, set_up_ros
     from tfcompose.cli.plans import expected_plan
     from tfcompose.foundation.findings import finding
@@ -66,7 +65,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.tf.ros.environment import RosError, child_environment
 
     plan, _ = expected_plan(arguments.file, arguments, recording_day(arguments.bag))
-    environment = child_environment(os.environ, plan.ros, own=False)
+    environment = child_environment(os.environ, plan.ros, is_built_in=False)
     if not arguments.only_print:
         set_up_ros(plan.ros)
     with Stop() as stop:
@@ -87,7 +86,7 @@ def run(arguments: Namespace) -> int:
 
 
 def _read(path: Path, plan: Plan, stop: Stop) -> Rewrite | None:
-    """Return the corrections of the bag, which know all its fixed edges; None: a signal came.
+    """Return the corrections with all fixed edges of the bag; None if a signal came.
 
     Raises:
         BagError: if the bag cannot be read.
@@ -110,13 +109,13 @@ def _read(path: Path, plan: Plan, stop: Stop) -> Rewrite | None:
 
 
 def _command(bag: str, static_topics: Sequence[str]) -> list[str]:
-    """Return the command that plays the bag with its fixed edges out of the way."""
+    """Return the command that plays the bag with remapped fixed edges."""
     rules = [f"{topic}:={topic}_recorded" for topic in static_topics]
     return ["ros2", "bag", "play", bag, "--remap", *rules]
 
 
 def warnings_of(edges: Collection[str]) -> list[Finding]:
-    """Return a finding about fixed edges that the bag sends on the topic of moving ones."""
+    """Return a finding about fixed edges that the bag sends on a topic of moving edges."""
     from tfcompose.foundation.findings import finding
 
     if not edges:
@@ -137,13 +136,13 @@ def _play(
     """Publish the fixed edges, and play the bag until it ends or a signal comes.
 
     Raises:
-        RosError: if ROS cannot start a node here.
+        RosError: if ROS cannot start a node.
     """
     from tfcompose.tf.ros.node import TFPublisher, open_node
 
     namespace = plan.ros.namespace or "/"
     with open_node("tfcompose_play", namespace) as node:
-        publishers = []  # what is latched ends with its publisher
+        publishers = []  # latched messages end with their publisher
         for channel, data in rewrite.openings(0):  # tf2 ignores the stamp of a fixed edge
             publishers.append(TFPublisher(node, static=True, topic=channel.topic))
             publishers[-1].publish(data)
@@ -158,7 +157,7 @@ def _play(
 
 
 def _end(player: subprocess.Popen[bytes]) -> int:
-    """End the player, if it has not ended, and return the exit code."""
+    """End the player, if it still runs, and return its exit code."""
     if player.poll() is not None:
         return player.returncode if player.returncode >= 0 else 128 - player.returncode
     for number in (signal.SIGINT, signal.SIGKILL):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE_HASH
 
-#: The version of metadata.yaml since which QoS is words instead of rmw's numbers (Jazzy).
+#: The version of metadata.yaml (Jazzy) since which QoS contains names instead of rmw's numbers.
 QOS_BY_WORDS = 9
 
 
@@ -17,7 +17,7 @@ class RecordedTopic(NamedTuple):
     type: str
     #: The language of ``definition``: ros2msg or ros2idl.
     encoding: str = ""
-    #: The type's definition with those of the types in it; empty if the bag has none.
+    #: The definition of the type, including the types that it contains; empty if the bag has none.
     definition: str = ""
 
 
@@ -59,8 +59,8 @@ TF_HASH = TF_MESSAGE_HASH
 def qos_profiles(metadata_version: int) -> list[dict[str, object]]:
     """Return the QoS of /tf_static's publishers as a bag of this version stores it.
 
-    Latched: keep the last 1, reliable, transient local. Since version 9 by words, before by rmw's
-    numbers.
+    /tf_static is latched: keep last 1, reliable, transient local. Since version 9, the bag stores
+    names of these policies, before that rmw's numbers.
     """
     by_words = metadata_version >= QOS_BY_WORDS
     never = {"sec": 9223372036, "nsec": 854775807}

@@ -1,4 +1,4 @@
-"""Rewriting of one file of a bag: what the storage formats ask of a correction."""
+"""Interface between the storage formats of bags and the corrections."""
 
 from __future__ import annotations
 
@@ -27,53 +27,54 @@ if TYPE_CHECKING:
 
 
 class InterruptedRewrite(Exception):  # noqa: N818 (a signal is no error)
-    """Raised when the work is to end before the bag is complete."""
+    """Raised if a signal ends the work before the bag is complete."""
 
 
-#: Returns the bytes of a message as they are to be; None: the message goes.
+#: A function from the bytes of a message to the corrected bytes; None removes the message.
 Edit = Callable[[bytes], "bytes | None"]
 
 
 @dataclass
 class Rewrite:
-    """Everything that changes in a bag, over all its files."""
+    """All changes of a bag, across all its files."""
 
     corrections: Mapping[Topics, TFCorrection]
     messages: MessageEditor
-    #: Text entries that the new bag's metadata gets.
+    #: Text entries for the metadata of the new bag.
     provenance: Mapping[str, str]
-    #: Ends the work early: a signal came.
+    #: Tells if a signal has ended the work.
     stop: Stop
     metadata_version: int = QOS_BY_WORDS
-    #: The QoS of each topic's publishers, as the bag's files store it.
+    #: The QoS of each topic's publishers, in the format of the bag.
     qos: dict[str, str] = field(default_factory=dict)
     #: The type of each topic of the bag.
     types: dict[str, str] = field(default_factory=dict)
-    #: Decompresses a message, in bags that compress each one.
+    #: A function that decompresses a message, if the bag compresses each message separately.
     expand: Callable[[bytes], bytes] | None = None
-    #: Compresses a message, in such bags.
+    #: A function that compresses a message in such a bag.
     compress: Callable[[bytes], bytes] | None = None
-    #: TFMessages that could not be decoded, by topic; they stay as they are.
+    #: The number of TFMessages that could not be decoded, by topic. They are copied without a
+    #: change.
     malformed: Counter[str] = field(default_factory=Counter)
 
     def go_on(self) -> None:
-        """Pass, unless a signal came.
+        """Do nothing, unless a signal came.
 
         Raises:
-            InterruptedRewrite: if one came.
+            InterruptedRewrite: if a signal came.
         """
         if self.stop.requested:
             raise InterruptedRewrite
 
     def qos_of(self, topic: str) -> str:
-        """Return the QoS of the publishers of a fixed topic, as the bag has it, or as tf2's."""
+        """Return the QoS of a fixed topic's publishers in the bag; if unknown, tf2's QoS."""
         recorded = self.qos.get(topic)
         if recorded is not None:
             return recorded
         return str(yaml.safe_dump(qos_profiles(self.metadata_version), sort_keys=False)).strip()
 
     def edit_of(self, channel: RecordedTopic) -> Edit | None:
-        """Return what changes the messages of a channel; None if they stay as they are."""
+        """Return a function that changes the messages of a channel; None if none changes."""
         edit = self.tf_edit_of(channel) or self.messages.editor_of(channel)
         if edit is None or self.expand is None or self.compress is None:
             return edit
@@ -89,7 +90,7 @@ class Rewrite:
         return edit_compressed
 
     def openings(self, stamp_ns: int) -> list[tuple[RecordedTopic, bytes]]:
-        """Return the messages that a file begins with, at a time in nanoseconds."""
+        """Return the messages with which a file begins, stamped with a time in nanoseconds."""
         messages = []
         for (_, static_topic), correction in self.corrections.items():
             data = correction.opening(stamp_ns)
@@ -99,7 +100,7 @@ class Rewrite:
         return messages
 
     def tf_edit_of(self, channel: RecordedTopic) -> Edit | None:
-        """Return what changes the TFMessages of a channel; None if it is not corrected."""
+        """Return a function that changes the TFMessages of a channel; None if none changes."""
         for topics, correction in self.corrections.items():
             if channel.topic in topics and channel.type == TF_MESSAGE:
                 return self._tf_edit(correction, channel.topic)

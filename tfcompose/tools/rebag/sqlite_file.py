@@ -1,4 +1,4 @@
-"""Rewriting of a rosbag2 SQLite file: a copy in which only changed rows are written."""
+"""Rewriting of a rosbag2 SQLite file: it copies the file and writes only changed rows."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
     from tfcompose.tools.rebag.rewriting import Edit, Rewrite
 
-#: Rows that are read at once.
+#: The number of rows that are read at once.
 _ROWS = 256
 
 
 def rewrite_sqlite(source: Path, target: Path, rewrite: Rewrite) -> Counter[str]:
-    """Write a database anew, and return the number of messages by topic.
+    """Write the corrected copy of a database, and return the number of messages by topic.
 
-    Rows that stay are copied with their pages.
+    SQLite copies unchanged rows as pages.
 
     Raises:
         sqlite3.Error: if the source is damaged, or the target cannot be written.
@@ -32,11 +32,11 @@ def rewrite_sqlite(source: Path, target: Path, rewrite: Rewrite) -> Counter[str]
         closing(sqlite3.connect(target, isolation_level=None)) as new,
     ):
         old.backup(new)
-        new.execute("PRAGMA journal_mode = OFF")  # the file has its final name only when complete
+        new.execute("PRAGMA journal_mode = OFF")  # a partial file is deleted anyway
         new.execute("PRAGMA synchronous = OFF")
         new.execute("BEGIN")
         _edit_messages(new, rewrite)
-        if _has_table(new, "metadata"):  # what rosbag2 keeps of metadata.yaml is no longer true
+        if _has_table(new, "metadata"):  # it describes the old bag
             new.execute("DELETE FROM metadata")
         new.execute("COMMIT")
         return Counter(
@@ -50,7 +50,7 @@ def rewrite_sqlite(source: Path, target: Path, rewrite: Rewrite) -> Counter[str]
 
 
 def qos_in_sqlite(file: Path) -> dict[str, str]:
-    """Return the QoS of each topic's publishers as the file stores it.
+    """Return the QoS of each topic's publishers in the file's format.
 
     Raises:
         sqlite3.Error: if the file is damaged.
@@ -77,7 +77,7 @@ def _edit_messages(database: sqlite3.Connection, rewrite: Rewrite) -> None:
 
 
 def _edits(database: sqlite3.Connection, rewrite: Rewrite) -> dict[int, Edit]:
-    """Return what changes the messages of each topic, by its id."""
+    """Return the functions that change messages, by the id of their topic."""
     definitions: dict[str, tuple[str, str]] = {}
     if _has_table(database, "message_definitions"):
         rows = database.execute(
@@ -113,7 +113,7 @@ def _edit_rows(database: sqlite3.Connection, edits: dict[int, Edit], rewrite: Re
 
 
 def _topic_id(database: sqlite3.Connection, channel: RecordedTopic, rewrite: Rewrite) -> int:
-    """Return the id of a topic, which is added if the file has none."""
+    """Return the id of a topic; add the topic if the file does not have it."""
     row = database.execute(
         "SELECT id FROM topics WHERE name = ? AND type = ?", (channel.topic, channel.type)
     ).fetchone()
@@ -139,10 +139,10 @@ def _topic_id(database: sqlite3.Connection, channel: RecordedTopic, rewrite: Rew
 def _add_definition(database: sqlite3.Connection, channel: RecordedTopic) -> None:
     if not _has_table(database, "message_definitions"):
         return
-    known = database.execute(
+    row = database.execute(
         "SELECT 1 FROM message_definitions WHERE topic_type = ?", (channel.type,)
     ).fetchone()
-    if not known:
+    if not row:
         database.execute(
             "INSERT INTO message_definitions (topic_type, encoding, encoded_message_definition,"
             " type_description_hash) VALUES (?, ?, ?, ?)",

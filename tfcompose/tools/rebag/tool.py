@@ -1,4 +1,4 @@
-"""Rebag tool: recordings with the poses of a robot file, written anew or played."""
+"""The tool ``rebag``: it rewrites or plays recordings with the poses of a robot file."""
 
 from tfcompose.foundation.tool import Command, Tool
 

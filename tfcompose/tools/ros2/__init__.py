@@ -1,1 +1,1 @@
-"""The ROS tool: tfcompose as a colcon package, a verb of ``ros2``, and a part of launch files."""
+"""Integration with ROS: the verb ``ros2 tfcompose``, colcon packages, and launch actions."""

@@ -1,8 +1,8 @@
 """Launch actions that start a robot: ``TfCompose`` in Python, ``<tfcompose/>`` in XML and YAML.
 
-An action starts one ``tfcompose up``, which supervises the robot; launch supervises that process.
-A named pipe brings the events of the robot. If launch is killed, the pipe has no reader, and the
-robot ends.
+An action starts ``tfcompose up``, which supervises the robot. launch supervises this process. A
+named pipe passes the events of the robot to launch. If launch is killed, the pipe has no reader,
+and ``up`` stops the robot.
 """
 
 from __future__ import annotations
@@ -41,9 +41,10 @@ if TYPE_CHECKING:
 
     from tfcompose.model.messages import Notice
 
-#: How launch is asked for the children of an element: it compares types with this one.
+#: The type with which launch returns the children of an element. launch compares types with
+#: ``List``, so ``list`` does not work.
 _CHILDREN = List[Entity]  # noqa: UP006
-#: Attributes of launch's ``<executable>`` that make no sense for a robot.
+#: Attributes of launch's ``<executable>`` that ``<tfcompose/>`` does not have.
 _NOT_FOR_ROBOTS = (
     "cmd",
     "emulate_tty",
@@ -58,20 +59,20 @@ _NOT_FOR_ROBOTS = (
 
 
 class RobotFailedError(Exception):
-    """Raised in launch when a robot fails, so that launch ends everything with exit code 1."""
+    """Raised in launch if a robot fails, so that launch exits with code 1."""
 
 
 @expose_action("tfcompose")
 class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
-    """Start a robot file, supervised by one ``tfcompose up``.
+    """Start the robot of a robot file with ``tfcompose up``.
 
-    ``file`` is the robot file, ``profiles`` and ``overlays`` are merged over it, and ``args`` are
-    the values of its arguments. Each may hold substitutions; a profile may name several, separated
-    by commas, or none. ``trust`` runs xacro and launch files without the sandbox. Namespace,
-    remappings and ``use_sim_time`` of the launch file around the action reach nodes and topics,
-    and never frames.
+    ``file`` is the robot file. ``profiles`` and ``overlays`` are merged over it. ``args`` are the
+    values of its arguments. Each may contain substitutions. An entry of ``profiles`` may be empty,
+    or may contain several names separated by commas. ``trust`` runs xacro and launch files without
+    the sandbox.
 
-    A robot that fails ends launch, with exit code 1.
+    Namespace, remappings and ``use_sim_time`` around the action apply to the robot's nodes and
+    topics, but never to frames. If the robot fails, launch exits with code 1.
     """
 
     #: The command of tfcompose that the action runs.
@@ -101,10 +102,10 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[TfCompose], dict[str, Any]]:
-        """Return the action that an element means, and its keywords.
+        """Return the action for an element, and its keywords.
 
-        Its attributes are ``file``, ``profile``, ``overlay``, ``trust`` and those of launch's
-        ``<executable>`` that fit; its children ``<arg name="…" value="…"/>``.
+        The attributes of the element are ``file``, ``profile``, ``overlay``, ``trust``, and most
+        attributes of launch's ``<executable>``. Its children are ``<arg name="…" value="…"/>``.
         """
         _, options = super().parse(entity, parser, ignore=_NOT_FOR_ROBOTS)
         options["file"] = parser.parse_substitution(entity.get_attr("file"))
@@ -166,7 +167,7 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
             yield f"{name}:={perform_substitutions(context, value)}"
 
     def _forward_events(self, context: LaunchContext) -> None:
-        """Hand the robot's events that have come on to launch."""
+        """Pass the received events of the robot to launch."""
         if self._events is None:
             return
         for notice in self._events.read():
@@ -177,7 +178,7 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
             context.asyncio_loop.remove_reader(self._events.fd)
 
     def _event(self, notice: Notice) -> RobotEvent | None:
-        """Return launch's event for a notice of the launcher, None where it has none."""
+        """Return the launch event for a notice of the launcher, or None if there is none."""
         from tfcompose.model import messages
 
         match notice:
@@ -189,7 +190,7 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
                 return None
 
     def _end(self, event: ProcessExited, context: LaunchContext) -> list[EmitEvent]:
-        """Report the end of the robot; one that failed ends launch."""
+        """Report the end of the robot; if the robot failed, end launch."""
         because: tuple[str, ...] = ()
         if self._events:
             self._forward_events(context)
@@ -205,7 +206,7 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
         return isinstance(event, RobotFailed) and event.action is self
 
     def _fail(self, context: LaunchContext) -> None:
-        """End launch, which returns 1 only after an exception."""
+        """End launch with an exception, because launch returns 1 only after an exception."""
         del context
         name, code = self.process_details["name"], self.return_code
         raise RobotFailedError(f"the robot of {name} ended with exit code {code}")
@@ -215,15 +216,15 @@ class TfCompose(ExecuteProcess):  # type: ignore[misc]  # launch has no types
 class TfComposeGuard(TfCompose):
     """Guard the tree of a robot whose nodes this launch file starts itself.
 
-    Nothing but the guard is started, by ``tfcompose guard``; keywords and attributes are those of
-    ``TfCompose``.
+    The action starts only the guard, with ``tfcompose guard``. It has the keywords and attributes
+    of ``TfCompose``.
     """
 
     command = "guard"
 
 
 class _EventPipe:
-    """A named pipe with the robot's events, in a folder of its own beside launch's logs."""
+    """A named pipe with the robot's events, in a separate folder in launch's log folder."""
 
     def __init__(self, robot: str) -> None:
         folder = tempfile.mkdtemp(prefix=f"{robot}_", dir=launch.logging.launch_config.log_dir)
@@ -235,7 +236,7 @@ class _EventPipe:
         self._rest = b""
 
     def read(self) -> Iterator[Notice]:
-        """Yield the notices that have come."""
+        """Yield the received notices."""
         from tfcompose.model.messages import Ended, read_notice
 
         while not self.is_over:
@@ -259,7 +260,7 @@ class _EventPipe:
         os.close(self.fd)
 
     def _remove(self) -> None:
-        """Remove the file, which is not needed once both ends are open."""
+        """Remove the file, which is no longer needed once both ends are open."""
         with contextlib.suppress(OSError):
             self.path.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""Handlers of a robot's events, for ``launch.actions.RegisterEventHandler``."""
+"""Event handlers for a robot's events, for ``launch.actions.RegisterEventHandler``."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 
 class OnTreeComplete(OnActionEventBase):  # type: ignore[misc]  # launch has no types
-    """Run actions once the tree of a robot is complete: every edge of its plan is live.
+    """Run actions once the tree of a robot is complete, that is, every edge of its plan is live.
 
-    Actions run once, as launch allows; a function is called each time.
+    Actions run only the first time, because launch can execute an action only once. A function is
+    called each time.
     """
 
     def __init__(
@@ -36,7 +37,7 @@ class OnTreeComplete(OnActionEventBase):  # type: ignore[misc]  # launch has no 
 
 
 class OnRobotProcessChanged(OnActionEventBase):  # type: ignore[misc]  # as above
-    """Call a function, or run actions, when a process of a robot goes into another state."""
+    """Call a function, or run actions, when the state of a robot's process changes."""
 
     def __init__(
         self,

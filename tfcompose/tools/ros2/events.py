@@ -1,6 +1,7 @@
-"""Events of a robot that launch started, as its launcher reports them.
+"""Launch events about a robot that launch started.
 
-The ``action`` of each is the ``TfCompose`` that started the robot.
+tfcompose's launcher reports these events. The ``action`` of an event is the ``TfCompose`` action
+that started the robot.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class RobotEvent(Event):  # type: ignore[misc]  # launch has no types
 class RobotTreeComplete(RobotEvent):
     """Every edge of the plan is live.
 
-    ``edges`` is their number, ``seconds`` the time since the robot's start.
+    ``edges`` is the number of edges. ``seconds`` is the time since the robot's start.
     """
 
     name = "tfcompose.tools.ros2.events.RobotTreeComplete"
@@ -37,10 +38,10 @@ class RobotTreeComplete(RobotEvent):
 
 
 class RobotProcessChanged(RobotEvent):
-    """A process of the robot went into another state.
+    """The state of a process of the robot has changed.
 
-    ``state`` is one of ``tfcompose.model.messages.StateName``, and ``detail`` the reason, such as
-    an exit code. ``pid`` is None where no process runs.
+    ``state`` is a ``tfcompose.model.messages.StateName``. ``detail`` is the reason, such as an
+    exit code. ``pid`` is None if the process does not run.
     """
 
     name = "tfcompose.tools.ros2.events.RobotProcessChanged"
@@ -58,8 +59,8 @@ class RobotProcessChanged(RobotEvent):
 class RobotEnded(RobotEvent):
     """The robot has ended, with all its processes.
 
-    ``exit_code`` is that of ``tfcompose up``, and ``because`` the message and the notes of the
-    first failure.
+    ``exit_code`` is the exit code of ``tfcompose up``. ``because`` contains the message and the
+    notes of the first failure.
     """
 
     name = "tfcompose.tools.ros2.events.RobotEnded"

@@ -1,7 +1,7 @@
-"""Robot files as launch files: a parser for ``ros2 launch PACKAGE rover.tfc.yaml demo:=true``.
+"""Parser of robot files as launch files: ``ros2 launch PACKAGE rover.tfc.yaml demo:=true``.
 
-launch asks each parser for files that no parser could read, too, so that this one refuses files of
-other names at once.
+If no parser accepts a file by its ending, launch tries all parsers. Therefore this parser refuses
+files with other endings immediately.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
     from tfcompose.spec.language import ArgSpec
 
-#: The endings of robot files that launch reads.
+#: The endings of robot files that launch accepts.
 EXTENSIONS = frozenset({"tfc.yaml", "tfc.yml"})
 
 
 class RobotFile(frontend.Entity):  # type: ignore[misc]  # launch has no types
-    """A robot file, of which launch knows the path alone."""
+    """A robot file; launch knows only its path."""
 
     type_name = "robot"
     parent = None
@@ -47,15 +47,15 @@ class RobotFileParser(frontend.Parser):  # type: ignore[misc]  # as above
 
     @classmethod
     def get_file_extensions(cls) -> set[str]:
-        """Return the endings of names, without a dot before them."""
+        """Return the endings of file names, without the first dot."""
         return set(EXTENSIONS)
 
     @classmethod
     def load(cls, file: str | TextIO) -> tuple[RobotFile, Self]:
-        """Return the robot file, unread.
+        """Return the robot file without reading it.
 
         Raises:
-            ValueError: if its name is not that of a robot file.
+            ValueError: if the file name does not end like a robot file's.
         """
         path = str(getattr(file, "name", file))
         if not cls.may_parse(path):
@@ -66,7 +66,7 @@ class RobotFileParser(frontend.Parser):  # type: ignore[misc]  # as above
     def parse_description(self, entity: RobotFile) -> LaunchDescription:
         """Return the robot's arguments and profiles as launch arguments, and its action.
 
-        A file that cannot be read has none; the action reports why.
+        If the file has errors, there are no launch arguments, and the action reports the errors.
         """
         args, profiles = _interface(entity.path)
         names = {profile: _argument_of(profile, args) for profile in profiles}
@@ -91,7 +91,7 @@ class RobotFileParser(frontend.Parser):  # type: ignore[misc]  # as above
 
 
 class RobotDescription(LaunchDescription):  # type: ignore[misc]  # as above
-    """A robot file's launch description, which lints the file where its arguments are listed."""
+    """The launch description of a robot file, which lints the file for ``--show-args``."""
 
     def __init__(self, file: str, entities: Iterable[Any]) -> None:
         super().__init__(entities)
@@ -100,7 +100,7 @@ class RobotDescription(LaunchDescription):  # type: ignore[misc]  # as above
     def get_launch_arguments(self, conditional_inclusion: bool = False) -> list[Any]:  # noqa: FBT001, FBT002 (launch's signature)
         """Return the launch arguments, and print the file's findings to stderr.
 
-        ``ros2 launch --show-args`` calls this; a launch does not.
+        ``ros2 launch --show-args`` calls this method; starting the file does not.
         """
         _print_findings(self._file)
         arguments: list[Any] = super().get_launch_arguments(conditional_inclusion)
@@ -108,7 +108,7 @@ class RobotDescription(LaunchDescription):  # type: ignore[misc]  # as above
 
 
 class _NameIfTrue(Substitution):  # type: ignore[misc]  # as above
-    """A profile's name if its launch argument is true, else nothing."""
+    """A substitution: a profile's name if its launch argument is true, else empty."""
 
     def __init__(self, name: str, argument: str) -> None:
         self._name = name
@@ -125,28 +125,29 @@ class _NameIfTrue(Substitution):  # type: ignore[misc]  # as above
 
 
 def _interface(file: str) -> tuple[Mapping[str, ArgSpec], tuple[str, ...]]:
-    """Return the arguments and the names of the profiles; none where the file has findings."""
-    from tfcompose.cli.args import args_and_profiles
+    """Return the arguments and the names of the profiles; empty if the file has errors."""
+    from tfcompose.cli.args import args_of
+    from tfcompose.cli.compiling import load_robot
+    from tfcompose.spec.language import profiles_in
 
     try:
-        return args_and_profiles(file)
+        source = load_robot(file)
+        return args_of(source), tuple(profiles_in(source))
     except RejectedError:
         return {}, ()
 
 
 def _print_findings(file: str) -> None:
-    """Print the findings of a robot file to stderr; a required argument may lack a value."""
-    from tfcompose.cli.compiling import library
+    """Print the findings of a robot file to stderr, without findings about missing arguments."""
+    from tfcompose.cli.compiling import library, load_robot
     from tfcompose.cli.linting import Linter
     from tfcompose.cli.parser import parser_of
     from tfcompose.cli.reading import read_text
     from tfcompose.cli.terminal import print_findings
-    from tfcompose.spec.language import with_includes
-    from tfcompose.spec.load import load
 
     linter = Linter(parser_of("lint").parse_args([file]), library(), os.environ, has_one_file=True)
     try:
-        source = with_includes(load(read_text(file), file), read_text)
+        source = load_robot(file)
     except RejectedError as error:
         print_findings(error.findings, sys.stderr)
         return
@@ -159,7 +160,10 @@ def _print_findings(file: str) -> None:
 
 
 def _argument_of(profile: str, args: Mapping[str, Any]) -> str:
-    """Return the name of a profile's launch argument; an argument of the robot has precedence."""
+    """Return the name of a profile's launch argument.
+
+    If an argument of the robot has the profile's name, the name is ``profile_NAME``.
+    """
     return f"profile_{profile}" if profile in args else profile
 
 

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
     from tfcompose.tools.ros2.package import Maintainer
 
-#: REP 144: two characters or more.
+#: Valid names of packages: at least two characters (REP 144).
 _NAME = re.compile(r"[a-z][a-z0-9_]+")
-#: As catkin_pkg, with which colcon reads manifests, checks addresses.
+#: Valid email addresses, as catkin_pkg checks them, with which colcon reads manifests.
 _EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-\w%]+(\.[-\w%]+)*\.[a-zA-Z]{2,}", re.ASCII)
-#: How packages that start a robot are called: ROBOT_bringup.
+#: The usual suffix of packages that start a robot.
 _SUFFIX = "_bringup"
 _GIT_TIMEOUT_S = 5
 
@@ -40,7 +40,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(command: str, arguments: Namespace) -> int | None:
-    """Write the package; exit code 2 where that fails. None without ``--package``."""
+    """Write the package; return exit code 2 if that fails, None without ``--package``."""
     del command
     if arguments.list:
         return None
@@ -85,7 +85,7 @@ def run(command: str, arguments: Namespace) -> int | None:
 
 
 def _check_name(package: str) -> None:
-    """Refuse a name that no package can have.
+    """Refuse an invalid name of a package.
 
     Raises:
         SystemExit: after reporting why.
@@ -103,7 +103,7 @@ def _check_name(package: str) -> None:
 
 
 def _maintainer() -> Maintainer:
-    """Return whom Git names as the author, as ``ros2 pkg create`` does."""
+    """Return the author of Git's settings, as ``ros2 pkg create`` does."""
     from tfcompose.tools.ros2.package import UNKNOWN, Maintainer
 
     name, email = (" ".join(_git_setting(key).split()) for key in ("user.name", "user.email"))
@@ -113,7 +113,7 @@ def _maintainer() -> Maintainer:
 
 
 def _git_setting(key: str) -> str:
-    """Return a setting of Git; empty without it, and without Git."""
+    """Return a setting of Git; empty if it is not set or Git is not installed."""
     git = shutil.which("git")
     if git is None:
         return ""

@@ -1,4 +1,4 @@
-"""Files of a ROS package with a robot, for colcon: ament_python or ament_cmake."""
+"""Files of a ROS package with a robot, with the build type ament_python or ament_cmake."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ENDING = ".in"
 
 
 class BuildType(NamedTuple):
-    """How ament builds a package."""
+    """A build type of ament, with the files that it needs."""
 
     name: str
     build_depends: tuple[str, ...]
@@ -29,22 +29,22 @@ AMENT_CMAKE = BuildType("ament_cmake", ("ament_cmake",), "ament_cmake_pytest", h
 
 
 class Maintainer(NamedTuple):
-    """Who the package's manifest names."""
+    """The maintainer in the manifest of a package."""
 
     name: str
     email: str
 
 
-#: What ``ros2 pkg create`` writes where Git names nobody.
+#: The maintainer that ``ros2 pkg create`` writes if Git has no author.
 UNKNOWN = Maintainer("TODO", "user@todo.todo")
 
 
 def package_files(
     package: str, robot: str, build_type: BuildType, maintainer: Maintainer
 ) -> Iterator[File]:
-    """Yield the files of a package without its robot files, which are below ``robots``.
+    """Yield the files of a package, except its robot files.
 
-    ``robots/ROBOT.tfc.yaml`` is the robot file that the launch file starts.
+    The launch file of the package starts ``robots/ROBOT.tfc.yaml``.
     """
     depends = "".join(
         f"  <buildtool_depend>{name}</buildtool_depend>\n" for name in build_type.build_depends

@@ -1,4 +1,4 @@
-"""ROS tool: the verb ``ros2 tfcompose``, colcon packages and launch files with robots."""
+"""The tool for ROS: the verb ``ros2 tfcompose``, colcon packages, and launch files."""
 
 from tfcompose.foundation.tool import Option, Tool, Topic
 

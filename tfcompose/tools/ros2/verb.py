@@ -1,8 +1,8 @@
-"""The verb ``ros2 tfcompose``: every command of tfcompose, under the name that ROS users type.
+"""The verb ``ros2 tfcompose``, which runs every command of tfcompose.
 
-``ros2`` finds it by the entry-point group ``ros2cli.command``. The verb replaces the process of
-``ros2`` by tfcompose, so that a command's options, help, completion, exit code, signals and memory
-are those of ``tfcompose COMMAND``.
+``ros2`` finds the verb in the entry-point group ``ros2cli.command``. The verb replaces the process
+of ``ros2`` by tfcompose. Therefore the options, help, completion, exit code, signals and memory of
+a command are the same as with ``tfcompose COMMAND``.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ class TfComposeCommand(CommandExtension):  # type: ignore[misc] # ROS has no typ
     """Check, build, start and guard a robot's TF tree."""
 
     def add_arguments(self, parser: ArgumentParser, _cli_name: str) -> None:
-        """Take everything after the verb as it is; complete it where a shell asks for that."""
+        """Accept all arguments after the verb without parsing; complete them if a shell asks."""
         if "_ARGCOMPLETE" in os.environ:
             _become_tfcompose([], os.environ | _completion_without_ros2(os.environ))
         parser.prefix_chars = ""  # no argument is an option of ros2, not even --help
         parser.add_argument("argv", nargs=REMAINDER)
 
     def main(self, *, parser: ArgumentParser, args: Namespace) -> NoReturn:  # noqa: ARG002 (ros2cli's)
-        """Run the command, in this process."""
+        """Run the command in this process."""
         _become_tfcompose(args.argv, os.environ)
 
 
@@ -47,7 +47,7 @@ def _become_tfcompose(argv: list[str], env: Mapping[str, str]) -> NoReturn:
 
 
 def _completion_without_ros2(env: Mapping[str, str]) -> dict[str, str]:
-    """Return the variables of argcomplete for the line that begins with the verb."""
+    """Return argcomplete's variables for a command line that begins with the verb."""
     line, point = env["COMP_LINE"], int(env["COMP_POINT"])
     before = _BEFORE_VERB.match(line)
     start = before.end() if before else 0

@@ -1,5 +1,5 @@
 """Browser view of a robot, and editing of its mounts.
 
-A new pose becomes edits of the robot file. ``edit`` is pure functions over the file's text;
-``scene`` and ``panel`` use viser. The caller reads, compiles and writes files.
+``scene`` and ``panel`` draw the robot and its controls with viser. ``session`` turns moved poses
+into edits of the robot file. The command reads, compiles and writes the files.
 """

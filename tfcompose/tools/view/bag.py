@@ -1,8 +1,8 @@
-"""A recording for the view: poses of frames at any time, and findings.
+"""Tree of a recording for the view: poses of frames at any time, and findings.
 
-All transforms of a bag are kept as numbers, 64 bytes each. A frame has the pose that was recorded
-last before the shown time. A fixed edge is valid at any time, as in tf2, so before its first
-message it has that message's pose.
+The tree keeps all transforms of a bag as numbers, with 64 bytes for each. A frame has its last
+recorded pose before the chosen time. A fixed edge is valid at any time, as in tf2. Before its
+first message, a fixed edge has the pose of this message.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ _SECOND_NS = 1_000_000_000
 
 @dataclass(slots=True)
 class _Track:
-    """What was recorded of one frame, in the order of recording.
+    """The recorded transforms of a frame, in the order of recording.
 
-    Of each the parent, and whether it was fixed.
+    Each transform has its parent, and whether it was fixed.
     """
 
     times_ns: array[int] = field(default_factory=lambda: array("q"))
@@ -50,20 +50,20 @@ class _Track:
 
     def add(self, at_ns: int, row: Row, parent: int, *, static: bool) -> None:
         if self.times_ns and at_ns < self.times_ns[-1]:
-            at_ns = self.times_ns[-1]  # the files of a bag may overlap
+            at_ns = self.times_ns[-1]  # the files of a bag may overlap in time
         self.times_ns.append(at_ns)
         self.poses.extend(row[4:11])
         self.parents.append(parent)
         self.is_fixed.append(static)
 
     def index_at(self, at_ns: int) -> int | None:
-        """Return which one held then; None where nothing had come yet."""
+        """Return the index of the transform that was valid at a time; None before the first."""
         index = bisect_right(self.times_ns, at_ns) - 1
         return index if index >= 0 else 0 if self.is_fixed[0] else None
 
 
 class RecordingObserver(TreeObserver):
-    """Keeps every transform besides the observation, by frame."""
+    """Observes a tree, and also keeps every transform, by frame."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -79,7 +79,7 @@ class RecordingObserver(TreeObserver):
         received_ns: int,
         clock_ns: int | None = None,
     ) -> None:
-        """Take one message."""
+        """Add a message."""
         rows = tuple(rows)
         super().take(rows, static=static, gid=gid, received_ns=received_ns, clock_ns=clock_ns)
         for row in rows:
@@ -92,10 +92,10 @@ class RecordingObserver(TreeObserver):
 
 
 class Recorded:
-    """The contents of a bag on pairs of topics (moving, fixed).
+    """The contents of a bag on some pairs of topics (moving, fixed).
 
     Raises:
-        BagError: if it cannot be read, or has none of the topics.
+        BagError: if the bag cannot be read, or contains none of the topics.
     """
 
     def __init__(self, path: str, topics: Iterable[Topics]) -> None:
@@ -115,10 +115,8 @@ class BagTree(ShownTree):
     """A recorded tree at a time, ``at_s`` seconds after the first transform.
 
     Args:
-        robot: as it is in the file.
-        plan: what its processes publish.
-        recorded: the bag, on the plan's topics at least.
-        tolerance: how far a pose may be off.
+        robot: the robot of the file. plan: the plan of this robot. recorded: the contents of the
+        bag on the plan's topics. tolerance: the largest accepted deviation of a pose.
     """
 
     def __init__(self, robot: Robot, plan: Plan, recorded: Recorded, tolerance: Offset) -> None:
@@ -141,7 +139,7 @@ class BagTree(ShownTree):
         return self._recorded.begin_ns + round(self.at_s * _SECOND_NS)
 
     def _newest(self) -> Mapping[str, Row]:
-        found: dict[str, tuple[_Track, int, Row]] = {}
+        newest: dict[str, tuple[_Track, int, Row]] = {}
         for observer in self._recorded.observers.values():
             names = list(observer.parents)
             for child, track in observer.tracks.items():
@@ -149,20 +147,20 @@ class BagTree(ShownTree):
                 if index is None:
                     continue
                 name = self._pictures.name(child)
-                other, before = found.get(name), self._rows.get(name)
-                if other is not None and other[0].times_ns[other[1]] > track.times_ns[index]:
+                best, before = newest.get(name), self._rows.get(name)
+                if best is not None and best[0].times_ns[best[1]] > track.times_ns[index]:
                     continue
                 if before is not None and before[0] is track and before[1] == index:
-                    found[name] = before
+                    newest[name] = before
                     continue
                 x, y, z, qx, qy, qz, qw = track.poses[index * _NUMBERS : (index + 1) * _NUMBERS]
                 row: Row = (names[track.parents[index]], child, 0, 0, x, y, z, qx, qy, qz, qw)
-                found[name] = (track, index, row)
-        self._rows = found
-        return {name: row for name, (_, _, row) in found.items()}
+                newest[name] = (track, index, row)
+        self._rows = newest
+        return {name: row for name, (_, _, row) in newest.items()}
 
     def about(self, frame: str) -> list[str]:
-        """Return text about the edge above a frame at the shown time, then findings."""
+        """Return text about the edge above a frame at the chosen time, then its findings."""
         if frame in self._rows:
             track, index, row = self._rows[frame]
             rate = self._rates.get(frame)

@@ -1,4 +1,4 @@
-"""``view --bag``: the browser view shows a recording at a chosen time."""
+"""Source of a scene for ``view --bag``: a recording at a chosen time."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from tfcompose.tools.view.reload import ReloadedPanel
     from tfcompose.tools.view.session import Session
 
-#: A larger time counts from the epoch.
+#: The longest recording, in seconds. A larger ``--at`` is a time since the epoch.
 _LONGEST_S = 1e8
-#: What the slider moves by, in seconds.
+#: The step of the time slider, in seconds.
 _STEP_S = 0.01
 
 
 class BagSource(SceneSource):
-    """A bag at a chosen time, with the robot of a session.
+    """Shows the robot of a session at the poses that a bag has at a chosen time.
 
     Raises:
-        SystemExit: after saying why the bag cannot be shown, or not at that time.
+        SystemExit: after printing why the bag cannot be shown, or not at that time.
     """
 
     def __init__(self, path: str, at_s: float, session: Session, tolerance: Offset) -> None:
@@ -47,18 +47,18 @@ class BagSource(SceneSource):
                 UNREADABLE,
             )
 
-    def show_in(self, shown: ReloadedPanel) -> None:
-        """Show the recording in a window with the robot as it is now."""
-        session, choices = shown.session, shown.panel.choices
+    def show_in(self, panel: ReloadedPanel) -> None:
+        """Show the recording in a window, with the current robot."""
+        session, choices = panel.session, panel.panel.choices
         tree = BagTree(session.robot, plan_of_session(session), self._recorded, self._tolerance)
         tree.at_s = self._at_s if choices.at_s is None else choices.at_s
-        show_recording(shown.server, shown.panel, tree, self._recorded.length_s)
+        show_recording(panel.server, panel.panel, tree, self._recorded.length_s)
 
 
 def show_recording(
     server: viser.ViserServer | viser.ClientHandle, panel: Panel, tree: BagTree, length_s: float
 ) -> PublishedTree:
-    """Show a recorded tree next to the panel of its robot, with a time slider."""
+    """Add a recorded tree and a time slider to the panel of its robot."""
     section = PublishedTree(server, panel, tree, "Tree")
     with server.gui.add_folder("Recording", order=-2):
         slider = server.gui.add_slider(

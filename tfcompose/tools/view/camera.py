@@ -1,4 +1,4 @@
-"""Camera of a scene: named views that fit all of it, in perspective or parallel projection."""
+"""Camera of a scene: named views of the whole scene, in perspective or parallel projection."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 if TYPE_CHECKING:
     import viser
 
-#: Vertical angles of view in radians: viser's own, and one at which lines that are parallel look
-#: so. viser has no orthographic camera.
+#: Vertical angles of view in radians: viser's default, and an angle so small that the picture
+#: looks like a parallel projection. viser has no orthographic camera.
 _WIDE_RAD, _PARALLEL_RAD = math.radians(75), math.radians(1)
-#: Directions from the robot to the camera, by the names of views: x is forward, y left (REP 103).
-#: From above and from below forward is up in the picture.
+#: Directions from the robot to the camera, by the names of views. x is forward, y is left
+#: (REP-103). In views from above and from below, forward is up in the picture.
 VIEWS = {
     "corner": (0.62, 0.62, 0.48),
     "front": (1.0, 0.0, 0.0),
@@ -25,7 +25,7 @@ VIEWS = {
     "top": (-1e-3, 0.0, 1.0),
     "bottom": (-1e-3, 0.0, -1.0),
 }
-#: What is shown takes this part of the picture.
+#: The part of the picture that the scene fills.
 _FILLED = 0.8
 
 
@@ -33,9 +33,9 @@ _FILLED = 0.8
 class Bounds:
     """The sphere around the contents of a scene."""
 
-    #: Shape (3,), in metres.
+    #: The centre, an array of shape (3,) in metres.
     middle: Any
-    #: In metres.
+    #: The radius in metres.
     radius: float
 
     @classmethod

@@ -1,6 +1,7 @@
-"""Selection and visibility chosen in a view, by name.
+"""Choices that the user makes in a view, such as the selected frame.
 
-They outlive the panel, which is rebuilt when a file changes.
+The view builds a new panel when a file changes. The choices stay, because they refer to frames,
+owners and sensors by name.
 """
 
 from __future__ import annotations
@@ -10,13 +11,13 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class Choices:
-    """Choices in the view. They may name frames, owners or sensors that are gone."""
+    """Choices in a view. They may name frames, owners or sensors that no longer exist."""
 
-    #: The selected frame; empty: none.
+    #: The selected frame; empty for none.
     selected: str = ""
-    #: The frame in which poses are given; empty: each frame's parent.
+    #: The frame in which the panel shows poses; empty for the parent of each frame.
     base: str = ""
-    #: The frame from which a published tree is seen; empty: the robot's base.
+    #: The fixed frame of a published tree; empty for the robot's base.
     fixed: str = ""
     #: The search text for frame names.
     search: str = ""
@@ -29,7 +30,7 @@ class Choices:
     owners: dict[str, bool] = field(default_factory=dict)
     #: Whether a sensor's fields of view are shown.
     sensors: dict[str, bool] = field(default_factory=dict)
-    #: The drawn length of fields of view in metres; None: derived from the robot's size.
+    #: The drawn length of fields of view in metres; None to derive it from the robot's size.
     reach: float | None = None
     #: Whether the camera uses parallel projection.
     is_parallel: bool = False
@@ -41,6 +42,6 @@ class Choices:
     snaps: bool = True
     #: Joint positions, in rad or m.
     positions: dict[str, float] = field(default_factory=dict)
-    #: The shown time of a recording, in seconds after its first transform; None: the time given at
-    #: the start.
+    #: The chosen time of a recording, in seconds after its first transform; None for the time of
+    #: ``--at``.
     at_s: float | None = None

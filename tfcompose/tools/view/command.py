@@ -1,10 +1,11 @@
 """Show a robot in the browser, and edit its mounts.
 
-Show the robot of FILE (a robot, or a built plan.json) in 3-D in the browser: bodies, frames,
-owners, joints. With --edit, drag mounts or type their poses, and save the values in the file.
-With --live, show frames at their published poses: a frame that differs from the robot has a ghost
-at its expected pose, and edges that are silent or from another publisher are red. With --bag,
-show frames as recorded, at the time of a slider.
+Show the robot of FILE (a robot file or a built plan.json) in 3-D in the browser: bodies, frames,
+owners, joints. With --edit, drag mounts or type their poses, and save the values to the file. With
+--live, show frames at their published poses; if a frame is elsewhere than in the robot file, show
+a transparent copy at the expected pose, and show edges that are silent or from another publisher
+in red. With --live and --edit, the running robot follows each move, as with nudge. With --bag,
+show the recorded poses at the time of a slider.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from tfcompose.cli.options import (
     add_bag,
     add_tolerance,
     add_variant,
+    changes_robot,
     tolerance,
 )
 from tfcompose.cli.terminal import UNREADABLE, fail, warn
@@ -42,7 +44,7 @@ _LAST_PORT = 65_535
 
 
 def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
+    """Add the arguments of ``view``."""
     parser.add_argument(
         "file",
         nargs="?",
@@ -71,7 +73,9 @@ def arguments(parser: ArgumentParser) -> None:
     add_tolerance(parser)
     parser.set_defaults(tolerance=None)
     parser.add_argument(
-        "--edit", action="store_true", help="move mounts, and save them in the file"
+        "--edit",
+        action="store_true",
+        help="move mounts, and save them in the file; with --live the running robot follows",
     )
     parser.add_argument(
         "--html", metavar="FILE", help="write one self-contained HTML file, and exit"
@@ -87,9 +91,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Serve the view until Ctrl-C, or write it.
+    """Serve the view until Ctrl-C, or write it to a file.
 
-    Exit code 1 if the file gives no robot, 2 if it cannot be shown.
+    Return exit code 1 if the file has errors, 2 if the robot cannot be shown.
     """
     try:
         from tfcompose.tools.view.reload import WatchedFiles
@@ -111,7 +115,7 @@ def run(arguments: Namespace) -> int:
 
 
 def _refuse_options(arguments: Namespace) -> None:
-    """Refuse options that do not go together; ends then."""
+    """Exit if the arguments contain options that exclude each other."""
     is_published = arguments.live or bool(arguments.bag)
     source = "--live" if arguments.live else "--bag"
     refusals = (
@@ -127,8 +131,12 @@ def _refuse_options(arguments: Namespace) -> None:
             ),
         ),
         (
-            is_published and (arguments.html or arguments.edit),
-            f"{source} shows what is published: leave out --html and --edit",
+            is_published and arguments.html,
+            f"{source} shows what is published: leave out --html",
+        ),
+        (
+            arguments.bag and arguments.edit,
+            "--bag shows what was published: leave out --edit",
         ),
         (
             arguments.at is not None and not arguments.bag,
@@ -174,9 +182,9 @@ def _serve(session: Session, files: WatchedFiles, arguments: Namespace) -> int:
 
 
 def _source_of(session: Session, arguments: Namespace) -> SceneSource:
-    """Return where frames are: in the file, in a running tree, or in a recording.
+    """Return the source of poses: the robot file, a running tree, or a recording.
 
-    For a running tree this process is set up for its ROS.
+    For a running tree, set this process up for the ROS settings of the robot.
     """
     tolerated = arguments.tolerance or tolerance(TOLERANCE)
     if arguments.bag:
@@ -191,14 +199,16 @@ def _source_of(session: Session, arguments: Namespace) -> SceneSource:
         set_up_ros(plan.ros)
         from tfcompose.tools.view.live_source import LiveSource, observers_of
 
-        return LiveSource(observers_of(plan), tolerated, joints=arguments.joints)
+        return LiveSource(
+            observers_of(plan), tolerated, joints=arguments.joints, edit=arguments.edit
+        )
     from tfcompose.tools.view.windows import SceneSource
 
     return SceneSource(has_edit=arguments.edit)
 
 
 def _write(session: Session, path: Path) -> None:
-    """Write the scene as one file; ends where it cannot be written."""
+    """Write the scene as a single file; exit if it cannot be written."""
     from tfcompose.cli.writing import replace_file
     from tfcompose.tools.view.page import page_of
 
@@ -210,32 +220,23 @@ def _write(session: Session, path: Path) -> None:
 
 
 def _running_plan(arguments: Namespace) -> str | None:
-    """Return the plan that the robot runs with that is in this ROS domain.
+    """Return the path of the plan of the robot that runs in this ROS domain.
 
-    None if there is none, or none is meant.
+    Return None if no robot runs, or if the arguments name a file.
     """
-    if (
-        not arguments.live
-        or arguments.profiles
-        or arguments.overlays
-        or arguments.settings
-        or arguments.arg_values
-    ):
+    if not arguments.live or arguments.edit or changes_robot(arguments):
         return None
     from tfcompose.cli.runs import plan_file, run_of_domain
 
-    found = run_of_domain()
-    if found is None:
+    run = run_of_domain()
+    if run is None:
         return None
-    warn(f"{found[0].name} runs here, so it is shown")
-    return str(plan_file(found[0]))
+    warn(f"{run[0].name} runs here, so it is shown")
+    return str(plan_file(run[0]))
 
 
 def _check_output(path: Path, files: Sequence[str]) -> None:
-    """Refuse a page that cannot be written, or that would replace one of the robot's files.
-
-    Ends then.
-    """
+    """Exit if the page cannot be written, or would replace a file of the robot."""
     from tfcompose.foundation.reading import is_folder
 
     if not is_folder(path.parent):
@@ -245,7 +246,7 @@ def _check_output(path: Path, files: Sequence[str]) -> None:
 
 
 def _free(host: str, port: int) -> int:
-    """Return the port; ends with the next free one named where it is taken."""
+    """Return the port; if it is in use, print the next free port and exit."""
     if not 0 <= port <= _LAST_PORT:
         fail(
             f"port {port} does not exist: --port takes 0 to {_LAST_PORT}, 0 for any free port",
@@ -254,7 +255,8 @@ def _free(host: str, port: int) -> int:
     if trouble := _trouble(host, 0):
         fail(f"--host {host} is not an address of this machine: {trouble}", UNREADABLE)
     following = next(
-        (other for other in range(port, _LAST_PORT + 1) if not _trouble(host, other)), None
+        (candidate for candidate in range(port, _LAST_PORT + 1) if not _trouble(host, candidate)),
+        None,
     )
     if following != port:
         fail(
@@ -265,7 +267,7 @@ def _free(host: str, port: int) -> int:
 
 
 def _trouble(host: str, port: int) -> str:
-    """Return why nobody can listen there, empty if somebody can."""
+    """Return why the view cannot listen on an address; empty if it can."""
     import socket
 
     try:
@@ -279,7 +281,10 @@ def _trouble(host: str, port: int) -> str:
 
 
 def _address(host: str, port: int, token: str) -> str:
-    """Return the address to open; a server on all addresses is reached by its host name."""
+    """Return the URL of the view.
+
+    If the server listens on all addresses, the URL contains the host name.
+    """
     import socket
 
     name = socket.gethostname() if host in _EVERYWHERE else f"[{host}]" if ":" in host else host
@@ -287,7 +292,7 @@ def _address(host: str, port: int, token: str) -> str:
 
 
 def _seconds(text: str) -> float:
-    """Read a time; raises ArgumentTypeError."""
+    """Parse a time in seconds; raise ArgumentTypeError if it is invalid."""
     try:
         value = float(text)
     except ValueError:
@@ -299,10 +304,11 @@ def _seconds(text: str) -> float:
 
 @contextmanager
 def _announce(address: str, arguments: Namespace) -> Iterator[None]:
-    """Say where the view is, and open the browser where that is wanted.
+    """Print the URL of the view, and open the browser unless an option says not to.
 
-    What starts a browser is among the arguments of a process, which every user of the machine can
-    read. So the browser gets a file that only this user can read, and that leads to the address.
+    Every user of the machine can read the arguments of a process, and the URL contains the token.
+    Therefore the browser is started with a file that only this user can read and that redirects to
+    the URL.
     """
     sys.stdout.write(f"{address}\nCtrl-C ends it\n")
     sys.stdout.flush()
@@ -318,5 +324,5 @@ def _announce(address: str, arguments: Namespace) -> Iterator[None]:
             page.flush()
             webbrowser.open(Path(page.name).as_uri())
         if take_interrupt():
-            raise KeyboardInterrupt  # trimesh's optional imports had swallowed it
+            raise KeyboardInterrupt  # optional imports of trimesh swallow the exception
         yield

@@ -1,4 +1,4 @@
-"""Facts about one frame of a robot, as lines of text."""
+"""Lines of text about a frame of a robot."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def numbers(pose: Pose) -> str:
-    """Return a pose for display, in mm and degrees."""
+    """Return a pose as text, in mm and degrees."""
     x, y, z = (f"{value * 1000:.4g}" for value in pose.xyz)
     roll, pitch, yaw = (f"{math.degrees(angle):.4g}" for angle in clean_rpy(pose.quat_xyzw))
     return f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg"
 
 
 def facts_of(robot: Robot, sources: Sequence[Source], frame: str) -> list[str]:
-    """Return a frame's parent and owner, its pose, and the places of its values."""
+    """Return the parent, owner and pose of a frame, and the locations of its values."""
     edge = robot.parent_edge(frame)
     if edge is None:
         return [f"{frame} is a root ({robot.frames[frame]})"]

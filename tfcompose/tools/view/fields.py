@@ -1,4 +1,4 @@
-"""Fields of view of each stream, and rays that the robot blocks."""
+"""Drawing of sensors' fields of view, and of rays that the robot's bodies block."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import MountedSensor, Optics, Robot
 
-#: The colours of fields of view, by what sees.
+#: The colours of fields of view, by the kind of stream.
 FIELD_COLOURS = {
     "camera": (40, 110, 220),
     "lidar": (225, 125, 20),
@@ -27,18 +27,20 @@ FIELD_COLOURS = {
 }
 _BLOCKED = (215, 40, 40)
 _OPACITY = 0.1
-#: How finely arcs are drawn, in radians, and how many points a cone's rim has.
+#: The angle between points of an arc, in radians, and the number of points of a cone's rim.
 _ARC_RAD = math.radians(3)
 _RIM = 48
-#: A field of view is drawn so far, in metres, at a scale of 1, unless the stream sees less far.
+#: The drawn length of a field of view in metres, at a scale of 1, if the stream's range is not
+#: shorter.
 _REACH_M = 0.5
 
 
 def rims(optics: Optics) -> list[Any]:
     """Return the boundary of the field of view: polylines, arrays (n, 3) in the stream's frame.
 
-    Empty if it is unknown. A camera's points are at a depth of 1 along its optical axis, those of
-    other sensors at a distance of 1. A closed polyline ends at its first point.
+    The list is empty if the field of view is unknown. The points of a camera are at a depth of 1
+    along the optical axis. The points of other sensors are at a distance of 1. A closed polyline
+    ends at its first point.
     """
     if optics.projection == "fisheye":
         if optics.diagonal is None:
@@ -100,14 +102,15 @@ def _directions(azimuths: Any, elevations: Any) -> Any:
 def outline(optics: Optics, reach: float) -> Any:
     """Return the lines that show a field of view up to ``reach`` metres.
 
-    An array (n, 2, 3) in the stream's frame: the rims at the least range and at the end of the
-    drawing, and lines between them.
+    The result is an array (n, 2, 3) in the stream's frame, in metres. It contains the rims at the
+    minimum range and at ``reach``, and lines between the two.
     """
     far, near = min(reach, optics.far or reach), optics.near or 0.0
     made = []
     for rim in rims(optics):
         made += [
-            np.stack((rim[:-1], rim[1:]), axis=1) * at for at in {far, min(near, far)} - {0.0}
+            np.stack((rim[:-1], rim[1:]), axis=1) * distance
+            for distance in {far, min(near, far)} - {0.0}
         ]
         spokes = rim[_corners(optics, rim)]
         made.append(np.stack((spokes * min(near, far), spokes * far), axis=1))
@@ -115,9 +118,9 @@ def outline(optics: Optics, reach: float) -> Any:
 
 
 def _corners(optics: Optics, rim: Any) -> list[int]:
-    """Return which points of a rim a line leads to.
+    """Return the indices of the rim's points from which ``outline`` draws lines.
 
-    The corners of an image, four of a circle, the ends of an arc.
+    These are the corners of an image, four points of a circle, or the ends of an arc.
     """
     if optics.kind == "camera" and optics.projection != "fisheye":
         return [0, 1, 2, 3]
@@ -127,7 +130,7 @@ def _corners(optics: Optics, rim: Any) -> list[int]:
 
 
 def surface(optics: Optics, reach: float) -> tuple[Any, Any]:
-    """Return a field of view's sides as triangles (vertices, faces) up to ``reach``."""
+    """Return the sides of a field of view as triangles (vertices, faces) up to ``reach``."""
     far = min(reach, optics.far or reach)
     vertices, faces = [np.zeros((1, 3))], [np.zeros((0, 3), int)]
     for rim in rims(optics):
@@ -139,7 +142,10 @@ def surface(optics: Optics, reach: float) -> tuple[Any, Any]:
 
 
 def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
-    """Yield the streams with a known field of view, once for each frame and view."""
+    """Yield the streams with a known field of view.
+
+    Streams with the same frame and the same field of view are yielded once.
+    """
     for sensor in robot.sensors:
         for optics in different_streams(sensor):
             if optics.frame in robot.frames and rims(optics):
@@ -152,10 +158,10 @@ def reach_at_scale(scale: float) -> float:
 
 
 class FieldsOfView:
-    """The fields of view in a scene; at first only those of cameras are shown.
+    """The fields of view in a scene.
 
-    ``update`` moves them. They are drawn up to ``reach``, in metres, which initially depends on
-    ``scale``.
+    At first, only the fields of cameras are visible. ``update`` moves all fields. They are drawn
+    up to ``reach``, in metres; its first value depends on ``scale``.
     """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, scale: float = 1.0) -> None:
@@ -167,17 +173,17 @@ class FieldsOfView:
         self._at: Mapping[str, Pose] = {}
         self.sensors = tuple(dict.fromkeys(sensor.name for sensor, _ in self._streams))
         cameras = {sensor.name for sensor, optics in self._streams if optics.kind == "camera"}
-        self.shown = {name: name in cameras for name in self.sensors}
+        self.visible = {name: name in cameras for name in self.sensors}
         for index, (sensor, _) in enumerate(self._streams):
             self._frames.append(
                 scene.add_frame(
-                    f"/fields/{index}", show_axes=False, visible=self.shown[sensor.name]
+                    f"/fields/{index}", show_axes=False, visible=self.visible[sensor.name]
                 )
             )
         self.draw(reach_at_scale(scale))
 
     def draw(self, reach: float) -> None:
-        """Draw the fields of view up to this length, in metres."""
+        """Draw the fields of view up to the length ``reach``, in metres."""
         self.reach = reach
         for index, (_, optics) in enumerate(self._streams):
             colour = FIELD_COLOURS[optics.kind]
@@ -201,7 +207,10 @@ class FieldsOfView:
             )
 
     def update(self, poses: Mapping[str, Pose]) -> None:
-        """Move every field of view to its frame's pose, in the root of its tree."""
+        """Move every field of view to the pose of its frame.
+
+        ``poses`` are poses of frames in the roots of their trees.
+        """
         for handle, (_, optics) in zip(self._frames, self._streams, strict=True):
             if optics.frame in poses and poses[optics.frame] != self._at.get(optics.frame):
                 x, y, z, w = poses[optics.frame].quat_xyzw
@@ -211,40 +220,40 @@ class FieldsOfView:
     def points(self, poses: Mapping[str, Pose]) -> Any:
         """Return the end points of the shown fields of view, shape (n, 3), in metres.
 
-        ``poses`` are those of frames in the roots of their trees.
+        ``poses`` are poses of frames in the roots of their trees.
         """
-        found = [np.zeros((0, 3))]
+        clouds = [np.zeros((0, 3))]
         for sensor, optics in self._streams:
-            if self.shown[sensor.name] and optics.frame in poses:
+            if self.visible[sensor.name] and optics.frame in poses:
                 pose = poses[optics.frame]
                 ends = outline(optics, self.reach).reshape(-1, 3)
-                found.append(np.array([(pose @ Pose(tuple(end))).xyz for end in ends.tolist()]))
-        return np.concatenate(found)
+                clouds.append(np.array([(pose @ Pose(tuple(end))).xyz for end in ends.tolist()]))
+        return np.concatenate(clouds)
 
     def pose(self, index: int) -> Pose:
-        """Return the pose in the scene of a stream's frame."""
+        """Return the pose of a stream's frame in the scene."""
         w, x, y, z = (float(value) for value in self._frames[index].wxyz)
         px, py, pz = (float(value) for value in self._frames[index].position)
         return Pose((px, py, pz), (x, y, z, w))
 
     def show(self, sensor: str, *, visible: bool) -> None:
         """Show or hide a sensor's fields of view."""
-        self.shown[sensor] = visible
+        self.visible[sensor] = visible
         self.hide(self._hidden)
 
     def hide(self, frames: frozenset[str]) -> None:
         """Hide the fields of view of these frames, and show those of all other shown sensors."""
         self._hidden = frames
         for handle, (sensor, optics) in zip(self._frames, self._streams, strict=True):
-            handle.visible = self.shown[sensor.name] and optics.frame not in frames
+            handle.visible = self.visible[sensor.name] and optics.frame not in frames
 
     def show_blocked(self, robot: Robot | None) -> list[str]:
-        """Draw the rays of the shown sensors that bodies of the robot block, as TF641 counts them.
+        """Draw the rays of visible sensors that bodies of the robot block, as TF641 counts them.
 
-        None: draw none.
+        If ``robot`` is None, draw no rays.
 
         Returns:
-            what is blocked, by stream: ``front (depth): 12 % by mast``.
+            a text for each stream with blocked rays: ``front (depth): 12 % by mast``.
         """
         for handle in self._blocked.values():
             handle.remove()
@@ -254,7 +263,7 @@ class FieldsOfView:
         lines, around = [], Surroundings(robot)
         mounted = {sensor.name: sensor for sensor in robot.sensors}
         for index, (sensor, optics) in enumerate(self._streams):
-            if not self.shown[sensor.name] or sensor.name not in mounted:
+            if not self.visible[sensor.name] or sensor.name not in mounted:
                 continue
             view = view_of(around, mounted[sensor.name], optics)
             ends = [_end(ray.direction, ray.distance) for ray in view.rays if ray.link is not None]

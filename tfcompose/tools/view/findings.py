@@ -1,6 +1,6 @@
 """Findings, and the result of a save, as HTML.
 
-Names in them come from files and from other publishers, so they are escaped.
+Texts are escaped, because they contain names from files and from other publishers.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.tools.view.session import Saved
 
-#: So many are shown.
+#: The maximum number of findings in the panel.
 MOST = 40
 _ADDED, _REMOVED = "rgb(20, 130, 50)", "rgb(200, 40, 40)"
 _COLOURS = {"error": "rgb(220, 30, 30)", "warning": "rgb(200, 120, 20)"}
 
 
 def findings_html(findings: Sequence[Finding], none: str = "") -> str:
-    """Return findings as lines of HTML, codes of errors in red.
+    """Return findings as lines of HTML, with red codes for errors.
 
-    ``none`` is the text without findings.
+    ``none`` is the text if there are no findings.
     """
     lines = [_line(finding) for finding in findings[:MOST]] or [escape(none)]
     return paragraphs(
@@ -39,7 +39,7 @@ def _line(finding: Finding) -> str:
 
 
 def paragraphs(lines: Sequence[str]) -> str:
-    """Return lines of HTML below one another, as wide as the panel."""
+    """Return HTML with each line as a paragraph that is as wide as the panel."""
     return (
         '<div style="padding: 0 0.7em; font-size: 0.85em; overflow-wrap:'
         f' anywhere">{"<br>".join(lines)}</div>'
@@ -75,7 +75,7 @@ def _diff_line(line: str) -> str:
 
 
 def _code(lines: Iterable[str]) -> str:
-    """Return lines of HTML as they stand in a file; those wider than the panel go on below."""
+    """Return lines of HTML in a fixed-width font; the panel wraps long lines."""
     style = (
         "margin: 0.3em 0.7em; font-size: 0.75em; white-space: pre-wrap; overflow-wrap: anywhere"
     )

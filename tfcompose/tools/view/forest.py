@@ -1,6 +1,7 @@
-"""Poses of many frames in the roots of their trees, computed level by level with arrays.
+"""Fast computation of the poses of many frames in the roots of their trees.
 
-A pose is a row of seven numbers: x, y, z in metres, then the unit quaternion x, y, z, w.
+A pose is a row of seven numbers: x, y, z in metres, then the unit quaternion x, y, z, w. The poses
+of all frames at the same depth are computed in a single array operation.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class FrameForest:
-    """The trees that frames form by their parents.
+    """The trees that frames and their parents form.
 
-    In a loop, one of the frames counts as a root.
+    If frames form a loop, a frame of the loop counts as a root.
     """
 
     def __init__(self, frames: Sequence[str], parents: Mapping[str, str]) -> None:
@@ -47,22 +48,23 @@ class FrameForest:
 
     def in_roots(self, local: Rows) -> Rows:
         """Return the pose of each frame in its root, shape (frames, 7)."""
-        composed: Rows = local.copy()
-        composed[self._roots] = IDENTITY
+        in_root: Rows = local.copy()
+        in_root[self._roots] = IDENTITY
         for rows, above in self._levels:
-            composed[rows] = _product(composed[above], local[rows])
-        return composed
+            in_root[rows] = _product(in_root[above], local[rows])
+        return in_root
 
-    def in_frame(self, frame: str, in_roots: Rows, others: Rows) -> Rows:
-        """Return ``others`` in the frame's tree as poses in the frame.
+    def in_frame(self, frame: str, in_roots: Rows, poses: Rows) -> Rows:
+        """Return ``poses`` relative to a frame.
 
-        ``in_roots`` has the frame's own pose.
+        ``poses`` and ``in_roots`` are poses in the root of the frame's tree. ``in_roots``
+        contains the pose of the frame itself.
         """
         same = self._root_of == self._root_of[self.index[frame]]
         inverse = np.array([row_of(pose_of(in_roots[self.index[frame]].tolist()).inverse())])
-        found: Rows = others.copy()
-        found[same] = _product(np.repeat(inverse, int(same.sum()), axis=0), others[same])
-        return found
+        rows: Rows = poses.copy()
+        rows[same] = _product(np.repeat(inverse, int(same.sum()), axis=0), poses[same])
+        return rows
 
     def below(self, frames: set[str]) -> set[str]:
         """Return these frames and all frames below them."""
@@ -74,21 +76,21 @@ class FrameForest:
 
 
 def _depths(frames: Sequence[str], parents: Mapping[str, str]) -> dict[str, int]:
-    """Return how many edges each frame is away from its root."""
-    known = frozenset(frames)
+    """Return the number of edges between each frame and its root."""
+    names = frozenset(frames)
     depths: dict[str, int] = {}
     for frame in frames:
         chain: dict[str, None] = {}
-        at = frame
-        while at not in depths and at not in chain:
-            chain[at] = None
-            above = parents.get(at)
-            if above is None or above not in known:
-                depths[at] = 0
+        ancestor = frame
+        while ancestor not in depths and ancestor not in chain:
+            chain[ancestor] = None
+            above = parents.get(ancestor)
+            if above is None or above not in names:
+                depths[ancestor] = 0
                 break
-            at = above
-        if at not in depths:  # a loop
-            depths[at] = 0
+            ancestor = above
+        if ancestor not in depths:  # a loop
+            depths[ancestor] = 0
         for name in reversed(chain):
             if name not in depths:
                 depths[name] = depths[parents[name]] + 1

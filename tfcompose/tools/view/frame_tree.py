@@ -1,4 +1,4 @@
-"""A robot's frames as rows of a tree, with closed and hidden subtrees."""
+"""Rows of the frame tree in the view, with closed and hidden subtrees."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ if TYPE_CHECKING:
 
     from tfcompose.model.robot import Robot
 
-#: How far rows are indented by a level, in em; deeper levels than these stay in their column.
+#: The indentation of each level in em, and the deepest level that is indented further.
 _INDENT_EM, _DEEPEST = 0.85, 14
-#: So many rows are open at first: whole levels of the tree, two at least.
+#: The maximum number of rows that are open at first. Levels are opened completely, and at least
+#: two levels are open.
 _OPEN_ROWS = 40
 
 
@@ -23,19 +24,22 @@ class Row:
     """A row of the tree."""
 
     frame: str
-    #: 0 for the root.
+    #: The depth of the frame; 0 for the root.
     depth: int
-    #: None if the frame has no children.
+    #: Whether the frame's children have rows; None if it has no children.
     is_open: bool | None
 
     @property
     def style(self) -> str:
-        """The indentation of the row, as a style for a page."""
+        """The indentation of the row as a CSS style."""
         return f"padding-left: {min(self.depth, _DEEPEST) * _INDENT_EM:.2f}em"
 
 
 class FrameTree:
-    """A robot's frames from top to bottom, below their first parents, without loops."""
+    """The frames of a robot as a tree.
+
+    A frame with several parents is below its first parent. Loops are cut.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._parents: dict[str, str] = {}
@@ -64,15 +68,18 @@ class FrameTree:
             self._open_levels += 1
 
     def parent(self, frame: str) -> str | None:
-        """Return the frame's parent in the tree, None for a root."""
+        """Return the frame's parent in the tree; None for a root."""
         return self._parents.get(frame)
 
     def is_open(self, frame: str, chosen: Mapping[str, bool]) -> bool:
-        """Return whether the tree is open below a frame: as chosen, or depending on its level."""
+        """Return whether the children of a frame have rows.
+
+        The user's choice counts first, then the level of the frame.
+        """
         return chosen.get(frame, self._depths[frame] < self._open_levels)
 
     def open_to(self, frame: str) -> dict[str, bool]:
-        """Return the choices that open the tree above a frame, so that it has a row."""
+        """Return the choices that open all frames above a frame, so that it has a row."""
         return dict.fromkeys(way_up(frame, self._parents.get)[1:], True)
 
     def matches(self, search: str) -> set[str]:
@@ -83,37 +90,39 @@ class FrameTree:
     def rows(self, chosen: Mapping[str, bool], search: str = "") -> Iterator[Row]:
         """Yield the rows from top to bottom.
 
-        Only rows below open frames, or during a search, matches and all frames above them.
+        Without a search, these are the rows below open frames. During a search, these are the
+        matches and all frames above them.
         """
         searches = bool(search.strip())
-        found = self.matches(search)
-        wanted = (
-            {above for frame in found for above in way_up(frame, self._parents.get)}
+        matches = self.matches(search)
+        visible = (
+            {above for frame in matches for above in way_up(frame, self._parents.get)}
             if searches
-            else found
+            else matches
         )
         closed_below = -1
         for frame, depth in self._depths.items():
-            if frame not in wanted or 0 <= closed_below < depth:
+            if frame not in visible or 0 <= closed_below < depth:
                 continue
             is_open = searches or self.is_open(frame, chosen)
             closed_below = -1 if is_open else depth
-            has_more = any(child in wanted for child in self._children.get(frame, ()))
+            has_more = any(child in visible for child in self._children.get(frame, ()))
             yield Row(frame, depth, is_open if has_more else None)
 
     def hidden_frames(self, chosen: Mapping[str, bool]) -> set[str]:
         """Return the hidden frames.
 
-        A frame is hidden if it, or its nearest ancestor with a choice, was hidden.
+        A frame is hidden if the user hid it. If the user made no choice for a frame, the choice
+        for its nearest ancestor counts.
         """
         is_shown: dict[str, bool] = {}
         for frame in self._depths:  # parents come first
             is_shown[frame] = chosen.get(frame, is_shown.get(self._parents.get(frame, ""), True))
-        return {frame for frame, shown in is_shown.items() if not shown}
+        return {frame for frame, is_visible in is_shown.items() if not is_visible}
 
-    def show(self, frame: str, chosen: Mapping[str, bool], *, shown: bool) -> dict[str, bool]:
+    def show(self, frame: str, chosen: Mapping[str, bool], *, is_visible: bool) -> dict[str, bool]:
         """Return the choices that show or hide a frame with all frames below it."""
-        others = below(self._children, frame)
-        rest = {name: value for name, value in chosen.items() if name not in others}
-        is_so_above = (frame in self.hidden_frames(rest)) != shown
-        return rest if is_so_above else {**rest, frame: shown}
+        descendants = below(self._children, frame)
+        rest = {name: value for name, value in chosen.items() if name not in descendants}
+        is_so_above = (frame in self.hidden_frames(rest)) != is_visible
+        return rest if is_so_above else {**rest, frame: is_visible}

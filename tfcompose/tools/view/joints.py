@@ -1,4 +1,4 @@
-"""Joint states from sliders, sent only if no other node sends them."""
+"""Sender of joint states from sliders, which sends only while no other node does."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
     from tfcompose.model.robot import Joint, Robot
 
-#: Who publishes already is found within this time, or almost always; then the graph is asked so
-#: often. Seconds.
+#: The time after which running publishers are nearly always discovered, and the interval of later
+#: checks of the ROS graph, in seconds.
 FOUND_S = 2.0
 _ASK_EVERY_S = 0.25
-#: How often positions are sent, in seconds; what they move is seen as often.
+#: The interval at which positions are sent, in seconds. The scene moves at the same interval.
 _SEND_EVERY_S = 0.05
 
 
-#: How far a joint without limits is moved, in rad or m.
+#: The largest position of a joint without limits, in rad or m.
 _UNLIMITED = math.pi
 
 
 class PositionPublisher(Protocol):
-    """Publishes positions (rad or m) in the order of the names it was created with."""
+    """Publishes joint positions (rad or m), in the order of the names at its creation."""
 
     def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
         """Publish positions with this time stamp."""
 
     def close(self) -> None:
-        """Leave the topic."""
+        """Close the publisher."""
 
 
 def slider_range(joint: Joint) -> tuple[float, float]:
-    """Return the range of a joint's slider, lowest and highest, in rad or m."""
+    """Return the lowest and the highest position of a joint's slider, in rad or m."""
     lower, upper = -_UNLIMITED, _UNLIMITED
     if joint.limit and joint.type != "continuous":
         lower = joint.limit.lower if joint.limit.lower is not None else lower
@@ -58,38 +58,38 @@ def first_positions(robot: Robot) -> dict[str, float]:
 
 
 def joint_topics(robot: Robot, plan: Plan) -> dict[str, dict[str, str]]:
-    """Return the topics from which the plan's processes take joint states.
+    """Return the topics from which the plan's processes read joint states.
 
-    Each with its joints by their names there. In the robot, a joint of a part may have the part's
-    prefix.
+    Each topic maps the names of joints in its messages to names in the robot, which may have the
+    prefix of a part.
     """
-    found: dict[str, dict[str, str]] = {}
+    topics: dict[str, dict[str, str]] = {}
     joints = {robot.final(edge.child): edge.joint.name for edge in robot.edges if edge.joint}
     for edge in plan.edges:
         if edge.kind == "joint" and edge.joint and edge.child in joints:
             topic = joint_states_topic(plan, edge)
-            found.setdefault(topic, {})[edge.joint.name] = joints[edge.child]
-    return found
+            topics.setdefault(topic, {})[edge.joint.name] = joints[edge.child]
+    return topics
 
 
 @dataclass(slots=True)
 class JointSender:
-    """Sender of joint states on one topic.
+    """Sender of joint states on a topic.
 
-    It listens first, refuses if another node publishes there, and stops for good once another node
-    does.
+    It first listens. If another node publishes on the topic, it sends nothing. If another node
+    starts to publish later, it stops and does not start again.
     """
 
     topic: str
     #: The robot's joints, by their names in messages.
     names: Mapping[str, str]
-    #: Make the publisher.
+    #: A function that creates the publisher.
     make: Callable[[], PositionPublisher]
-    #: Return the names of other nodes that publish on the topic.
-    others: Callable[[], Sequence[str]]
+    #: A function that returns the names of other nodes that publish on the topic.
+    other_publishers: Callable[[], Sequence[str]]
     state: Literal["waiting", "sending", "refused", "stopped"] = "waiting"
-    #: The other publishers when it refused or stopped.
-    others_found: tuple[str, ...] = ()
+    #: The other publishers at the time when the sender refused or stopped.
+    publishers_found: tuple[str, ...] = ()
     _begun: float | None = None
     _ask_at: float = 0.0
     _send_at: float = 0.0
@@ -98,7 +98,7 @@ class JointSender:
     @property
     def text(self) -> str:
         """The state of the sender, for display."""
-        them = list_names(self.others_found)
+        them = list_names(self.publishers_found)
         return {
             "waiting": f"looking whether anybody publishes {self.topic}",
             "sending": f"the sliders publish {self.topic}",
@@ -109,15 +109,15 @@ class JointSender:
     def step(
         self, now: float, stamp_ns: int | None, robot: Robot, positions: Mapping[str, float]
     ) -> None:
-        """Do the work due at ``now``, in seconds of any clock.
+        """Look for other publishers, or send positions, if it is time to do so.
 
-        Look for other publishers, or send positions with this stamp. ``positions`` are those of
-        sliders, in rad or m; mimic joints follow.
+        ``now`` is a time in seconds of any clock. ``stamp_ns`` is the stamp of the message.
+        ``positions`` are the positions of sliders, in rad or m; mimic joints follow them.
         """
         self._begun = now if self._begun is None else self._begun
         if now >= self._ask_at:
             self._ask_at = now + _ASK_EVERY_S
-            self._give_way(self.others())
+            self._give_way(self.other_publishers())
         if self.state in {"refused", "stopped"}:
             return
         if self.state == "waiting" and now < self._begun + FOUND_S:
@@ -130,17 +130,20 @@ class JointSender:
             where = joint_positions(robot, positions)
             self._publisher.publish(stamp_ns, [where[name] for name in self.names.values()])
 
-    def _give_way(self, others: Sequence[str]) -> None:
-        """Leave the topic to others; a node that has just come may have no name yet."""
-        if not others:
+    def _give_way(self, nodes: Sequence[str]) -> None:
+        """Stop sending, and store the names of the other publishers.
+
+        A node that has just started may not have a name yet.
+        """
+        if not nodes:
             return
-        self.others_found = tuple(others)
+        self.publishers_found = tuple(nodes)
         if self.state in {"waiting", "sending"}:
             self.state = "refused" if self.state == "waiting" else "stopped"
             self.close()
 
     def close(self) -> None:
-        """Leave the topic."""
+        """Stop sending, and close the publisher."""
         if self._publisher is not None:
             self._publisher.close()
             self._publisher = None

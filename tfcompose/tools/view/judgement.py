@@ -1,4 +1,4 @@
-"""Findings of ``verify`` about an observed tree, by the frames of a scene."""
+"""Findings of ``verify`` about an observed tree, by frame of the scene."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Findings about a tree, by frame and in total, and deviations from the plan."""
+    """Findings about a tree, by frame and for the whole tree, and deviations from the plan."""
 
     findings: tuple[Finding, ...] = ()
     of_frame: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
@@ -61,9 +61,9 @@ class Judgement:
 
 
 class PlanJudge:
-    """Judges a robot by its plan; poses may deviate by the tolerance.
+    """Compares observed trees with the plan of a robot.
 
-    Frames have the names in the robot's file.
+    Poses may deviate by the tolerance. Frames have their names from the robot file.
     """
 
     def __init__(self, robot: Robot, plan: Plan, tolerance: Offset) -> None:
@@ -81,10 +81,11 @@ class PlanJudge:
         counts: Callable[[Difference], bool],
         holds: Callable[[EdgeState], bool] = lambda _: False,
     ) -> Judgement:
-        """Return findings about states on the plan's topics.
+        """Return findings about the states of the plan's topics.
 
-        A difference that does not count still marks its frame as off if its transform ``holds``,
-        that is, no newer one came.
+        ``counts`` decides if a difference becomes a finding. A difference that does not count
+        still marks its frame as off, if ``holds`` returns True for the edge: then no newer
+        transform has arrived.
         """
         findings: list[Finding] = []
         of_frame: dict[str, list[Finding]] = {}
@@ -138,7 +139,7 @@ def _children(group: Sequence[Difference]) -> Iterator[str]:
 
 
 def _off(difference: Difference) -> Iterator[tuple[str, Offset]]:
-    """Yield the frame that is not where the robot has it, and how far it is off."""
+    """Yield a frame that is not at its planned pose, and the distance."""
     if difference.edge is None or difference.live is None:
         return
     if difference.off is not None:

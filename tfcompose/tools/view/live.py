@@ -1,8 +1,8 @@
-"""A running tree for the view: poses of frames, edges with errors, and publishers.
+"""Tree of a running robot for the view: poses of frames, wrong edges and publishers.
 
-The caller feeds observers of a ``LiveTree``, which returns data for a scene and a panel. It reads
-no clock and no topic and does not depend on a browser. Frames have the names of the robot file; on
-the tree they may have a prefix.
+A ``LiveTree`` returns data for a scene and a panel. The caller passes messages to its observers,
+so that the tree reads no clock and no topic, and does not depend on a browser. Frames have their
+names from the robot file. In the running tree, their names may have a prefix.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ if TYPE_CHECKING:
 
     Topics = tuple[str, str]
 
-#: Publishers that were there before are found within this time; until then nothing is missing.
+#: The time in seconds within which running publishers are discovered. Before this time, no edge
+#: counts as missing.
 FOUND_S = 2.5
 _MISSING = frozenset({"TF804", "TF811"})
-#: How long a silence that is over is shown after it.
+#: The time in seconds for which the view shows a silence after its end.
 OVER_S = 3.0
 
 
@@ -38,10 +39,10 @@ class LiveTree(ShownTree):
     """Follows a running robot.
 
     Args:
-        robot: as it is in the file.
-        plan: what its processes publish.
-        observers: by topics (moving, fixed): those of the plan.
-        tolerance: how far a pose may be off.
+        robot: the robot of the file.
+        plan: the plan of this robot.
+        observers: an observer for each pair of topics (moving, fixed) of the plan.
+        tolerance: the largest accepted deviation of a pose.
     """
 
     def __init__(
@@ -50,31 +51,37 @@ class LiveTree(ShownTree):
         super().__init__(robot)
         self.judgement = Judgement()
         self._observers = observers
+        self._tolerance = tolerance
         self._judge = PlanJudge(robot, plan, tolerance)
         self._states: dict[str, list[EdgeState]] = {}
+
+    def follow(self, robot: Robot, plan: Plan) -> None:
+        """Compare with another version of the robot, with the same frames and other poses."""
+        self.show_robot(robot)
+        self._judge = PlanJudge(robot, plan, self._tolerance)
 
     def _newest(self) -> dict[str, Row]:
         return {child: stream.row for child, stream in self._streams().items()}
 
     def _streams(self) -> dict[str, EdgeStream]:
-        """Return the stream from which came what is newest of each frame, as tf2 has it.
+        """Return, for each frame, the stream of its newest transform in tf2.
 
-        Without what it refuses.
+        Transforms that tf2 would reject do not count.
         """
         newest: dict[str, EdgeStream] = {}
         for observer in self._observers.values():
             for stream in observer.streams:
                 if stream.rejected_row is stream.row:
                     continue
-                other = newest.get(stream.child)
-                if other is None or stream.arrivals.last_ns >= other.arrivals.last_ns:
+                current = newest.get(stream.child)
+                if current is None or stream.arrivals.last_ns >= current.arrivals.last_ns:
                     newest[stream.child] = stream
         return {self._pictures.name(child): stream for child, stream in newest.items()}
 
     def judge(self, listened_s: float) -> Judgement:
-        """Judge the received messages after this many seconds of listening.
+        """Return the findings about the received messages.
 
-        Return the findings.
+        ``listened_s`` is the time of listening, in seconds.
         """
         states = {
             topics: state_of(observer, topics) for topics, observer in self._observers.items()
@@ -83,7 +90,7 @@ class LiveTree(ShownTree):
         for state in states.values():
             for edge in state.edges:
                 edges.setdefault(self._pictures.name(edge.child), []).append(edge)
-        self._states = edges  # at once: a window reads it in a thread of its own
+        self._states = edges  # a single assignment, because each window reads it in its own thread
         streams = self._streams()
         self.judgement = self._judge.judge(
             states,
@@ -95,7 +102,7 @@ class LiveTree(ShownTree):
     def about(self, frame: str) -> list[str]:
         """Return text about the edge above a frame.
 
-        A line for each publisher, then findings.
+        It has a line for each publisher, then the findings.
         """
         edges = self._pictures.edges
         lines = [line for state in self._states.get(frame, ()) for line in _published_lines(state)]
@@ -105,10 +112,10 @@ class LiveTree(ShownTree):
 
 
 def _counts(difference: Difference, listened_s: float) -> bool:
-    """Return whether it is so now.
+    """Return whether the view shows a difference now.
 
-    Neither of a publisher that has left, nor of what may still come, nor of a silence that ended
-    a while ago.
+    It does not show differences of publishers that have left, missing edges while publishers may
+    still be discovered, and silences that ended some time ago.
     """
     if difference.over and difference.live is not None:
         since_s = difference.live.timing.since_gap_s
@@ -124,7 +131,7 @@ def _counts(difference: Difference, listened_s: float) -> bool:
 
 
 def _published_lines(edge: EdgeState) -> Iterator[str]:
-    """Yield who publishes an edge, in which parent, how often, and how old the newest pose is."""
+    """Yield a line for each publisher of an edge: node, parent, rate, age of the newest pose."""
     kind = (
         "fixed"
         if edge.stream.static

@@ -1,4 +1,4 @@
-"""``view --live``: the browser view follows the running tree until a signal ends it."""
+"""Source of a scene for ``view --live``: a running tree, until a signal ends the view."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import time
 import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
+from tfcompose.cli.adjusting import adjust, moved
 from tfcompose.cli.process_table import HEAD, row, state_of, uptime
 from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject, warn
-from tfcompose.foundation.findings import finding
+from tfcompose.foundation.findings import RejectedError, finding
 from tfcompose.foundation.signals import Stop
 from tfcompose.launcher.control import RequestRefusedError, ask
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of
@@ -34,18 +35,20 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from tfcompose.foundation.geometry import Offset
-    from tfcompose.model.plan import Plan
+    from tfcompose.launcher.runtime_dir import RuntimeDir
+    from tfcompose.model.plan import Plan, PlanEdge
     from tfcompose.model.robot import Robot
     from tfcompose.tools.view.reload import ReloadedPanel
     from tfcompose.tools.view.session import Session
 
     Topics = tuple[str, str]
 
-#: How often the scene is moved, the tree judged, and the launcher asked for its state; seconds.
+#: The intervals in seconds at which the source moves the scene, judges the tree, and asks the
+#: launcher for its state.
 _SHOW_EVERY_S, _JUDGE_EVERY_S, _ASK_EVERY_S = 0.04, 0.35, 2.0
-#: What the panel has room for of what ``ps`` lists.
+#: The columns of ``ps`` that fit into the panel.
 _COLUMNS = ("PROCESS", "STATE", "CPU", "MEMORY", "EDGES")
-#: Rates and gaps are those of the last one to two of these; seconds.
+#: The window for rates and gaps in seconds. They are measured over the last one to two windows.
 _WINDOW_S = 5.0
 
 
@@ -62,47 +65,89 @@ class LiveWindow(NamedTuple):
 
 
 class LiveSource(SceneSource):
-    """Updates the scenes of all windows, judges, and asks, each at its own interval.
-
-    With ``joints``, sliders publish joint states. Those of the window whose slider was moved last
-    count.
+    """Updates the scenes of all windows with the running tree.
 
     Args:
-        observers: by topics (moving, fixed): those of the plan.
-        tolerance: how far a pose may be off.
-        joints: whether sliders publish.
+        observers: an observer for each pair of topics (moving, fixed) of the plan.
+        tolerance: the largest accepted deviation of a pose.
+        joints: whether sliders publish joint states. The positions are those of the window in
+            which a slider was moved last.
+        edit: whether the running robot follows the mounts that a window moves.
     """
 
     def __init__(
-        self, observers: Mapping[Topics, TreeObserver], tolerance: Offset, *, joints: bool
+        self,
+        observers: Mapping[Topics, TreeObserver],
+        tolerance: Offset,
+        *,
+        joints: bool,
+        edit: bool = False,
     ) -> None:
         self._observers = observers
         self._tolerance = tolerance
-        super().__init__(has_joints=joints)
+        super().__init__(has_edit=edit, has_joints=joints)
         self._meter = UsageMeter()
-        self.shown: dict[ReloadedPanel, LiveWindow] = {}
+        self.windows_by_panel: dict[ReloadedPanel, LiveWindow] = {}
         self._judge_at = self._ask_at = 0.0
-        #: Where sliders were moved last, and where each window had them the last time.
+        #: The positions that were set last in any window, and the last known positions of each
+        #: window.
         self._positions: dict[str, float] = {}
         self._positions_in: dict[ReloadedPanel, dict[str, float]] = {}
         self._first_positions: dict[str, float] = {}
         self.senders: list[JointSender] = []
 
-    def show_in(self, shown: ReloadedPanel) -> None:
+    def show_in(self, panel: ReloadedPanel) -> None:
         """Show the tree in a window, next to the panel of its robot."""
-        robot, plan = shown.session.robot, plan_of_session(shown.session)
-        known = {pair: self._observers.get(pair) or TreeObserver() for pair in parts_of(plan)}
-        tree = LiveTree(robot, plan, known, self._tolerance)
-        self.shown[shown] = LiveWindow(tree, PublishedTree(shown.server, shown.panel, tree))
+        robot, plan = panel.session.robot, plan_of_session(panel.session)
+        observers = {pair: self._observers.get(pair) or TreeObserver() for pair in parts_of(plan)}
+        tree = LiveTree(robot, plan, observers, self._tolerance)
+        self.windows_by_panel[panel] = LiveWindow(
+            tree, PublishedTree(panel.server, panel.panel, tree)
+        )
         self._judge_at = self._ask_at = 0.0
 
-    def run(self, windows: Windows, changed: threading.Event) -> int:
-        """Follow the tree until a signal, in a process that is set up for its ROS.
+    def take_save(self, panel: ReloadedPanel) -> None:
+        """Compare with the files as a window has just saved them."""
+        if panel in self.windows_by_panel:
+            session = panel.session
+            self.windows_by_panel[panel].tree.follow(session.robot, plan_of_session(session))
 
-        Return the exit code.
+    def take_moves(self, session: Session) -> Sequence[str]:
+        """Have the running robot publish the poses that a window's mounts have now."""
+        robot = session.robot
+        touched = session.touched
+        poses = {robot.final(e.child): e.pose for e in robot.edges if e.child in touched}
+        later: dict[str, str] = {}
+
+        def choose(plan: Plan) -> dict[str, PlanEdge]:
+            edges = [edge for edge in plan.edges if edge.child in poses]
+            later.update((edge.name, edge.owner) for edge in edges if not plan.is_adjustable(edge))
+            return {
+                edge.child: moved(edge, poses[edge.child])
+                for edge in edges
+                if plan.is_adjustable(edge)
+            }
+
+        try:
+            runtime_dir = _run_of(robot.name)
+            if runtime_dir is None:
+                return [f"no robot {robot.name} runs here to follow the move"]
+            edges = adjust(runtime_dir, choose)
+        except (RuntimeDirError, RequestRefusedError, RejectedError, OSError, ValueError) as error:
+            return [f"{robot.name} does not follow: {error}"]
+        lines = [f"{edge.name}: {_adjustment(edge)}" for edge in edges.values()]
+        return lines + [
+            f"{name} moves after save and up --update: {owner} publishes it"
+            for name, owner in later.items()
+        ]
+
+    def run(self, windows: Windows, changed: threading.Event) -> int:
+        """Follow the tree until a signal, and return the exit code.
+
+        This process must be set up for the ROS settings of the robot.
 
         Raises:
-            SystemExit: after saying why ROS cannot be started.
+            SystemExit: after printing why ROS cannot be started.
         """
         with Stop() as stop:
             try:
@@ -112,40 +157,43 @@ class LiveSource(SceneSource):
         return INTERRUPTED
 
     def follow(self, windows: Windows, changed: threading.Event, stop: Stop) -> None:
-        """Follow the tree until ``stop`` is requested; show the new robot if files change.
+        """Follow the tree until ``stop`` is requested.
+
+        If files change, show the new robot.
 
         Raises:
-            RosError: if ROS cannot start a node, or take messages.
+            RosError: if ROS cannot start a node or receive messages.
         """
         from tfcompose.tf.live.ros_feed import (
             RosFeed,  # rclpy reads the environment when it is loaded
         )
 
-        # A window may close between two looks at which are open: viser warns of what it then gets.
+        # A window may close between two checks. viser then warns about messages to the closed
+        # window.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         with RosFeed("tfcompose_view", self._observers) as feed:
             begun = time.monotonic()
             self._follow(windows.session, feed.node)
 
             def show() -> None:
-                """Show what came, of the files as they are now."""
+                """Show the received messages for the current files."""
                 now = time.monotonic()
                 if changed.is_set():
                     changed.clear()
                     if windows.reload():
                         self._follow(windows.session, feed.node)
-                shown = self._open(windows)
-                self._show(shown, now, now - begun)
+                is_open = self._open(windows)
+                self._show(is_open, now, now - begun)
                 if self.senders:
                     self._take_positions(windows.panels)
-                    self._send(shown, now, feed.clock_ns, windows.session.robot)
+                    self._send(is_open, now, feed.clock_ns, windows.session.robot)
 
             follow(feed, stop, every_s=_SHOW_EVERY_S, show=show)
             for sender in self.senders:
                 sender.close()
 
     def _follow(self, session: Session, node: Node) -> None:
-        """Follow the robot that the session has now."""
+        """Follow the current robot of the session."""
         self._plan = plan_of_session(session)
         for sender in self.senders:
             sender.close()
@@ -157,56 +205,56 @@ class LiveSource(SceneSource):
             self.senders = [_sender(node, topic, names) for topic, names in topics.items()]
 
     def _open(self, windows: Windows) -> list[LiveWindow]:
-        """Return what shows the tree in windows that are open, and forget the others."""
-        known = list(self.shown)  # before: what is opened meanwhile is not forgotten
+        """Return the live parts of open windows, and forget closed windows."""
+        clients = list(self.windows_by_panel)  # first: a window may open now
         panels = windows.panels
-        for closed in set(known) - set(panels):
-            del self.shown[closed]
+        for closed in set(clients) - set(panels):
+            del self.windows_by_panel[closed]
             self._positions_in.pop(closed, None)
-        return [self.shown[panel] for panel in panels if panel in self.shown]
+        return [self.windows_by_panel[panel] for panel in panels if panel in self.windows_by_panel]
 
-    def _show(self, shown: Sequence[LiveWindow], now: float, listened_s: float) -> None:
-        """Show what came since the last time."""
+    def _show(self, windows: Sequence[LiveWindow], now: float, listened_s: float) -> None:
+        """Show the messages since the last call."""
         if now >= self._judge_at:
             self._judge_at = now + _JUDGE_EVERY_S
-            for tree, panel in shown:
+            for tree, panel in windows:
                 tree.judge(listened_s)
                 panel.show_text()
-        for _, panel in shown:
+        for _, panel in windows:
             panel.show()
         if now >= self._ask_at:
             self._ask_at = now + _ASK_EVERY_S
             title, rows = self._processes()
-            for _, panel in shown:
+            for _, panel in windows:
                 panel.show_processes(title, rows)
 
     def _take_positions(self, windows: Sequence[ReloadedPanel]) -> None:
-        """Take where sliders are from a window in which one was moved."""
-        for shown in windows:
-            positions = dict(shown.panel.positions)
-            if positions != self._positions_in.get(shown, self._first_positions):
+        """Copy the positions of all sliders from a window in which a slider was moved."""
+        for window in windows:
+            positions = dict(window.panel.positions)
+            if positions != self._positions_in.get(window, self._first_positions):
                 self._positions = positions
-            self._positions_in[shown] = positions
+            self._positions_in[window] = positions
 
     def _send(
-        self, shown: Sequence[LiveWindow], now: float, clock_ns: int | None, robot: Robot
+        self, windows: Sequence[LiveWindow], now: float, clock_ns: int | None, robot: Robot
     ) -> None:
-        """Let sliders publish, by the plan's clock."""
+        """Publish the positions of sliders, with stamps of the plan's clock."""
         stamp_ns = clock_ns if self._plan.ros.clock == "sim" else time.time_ns()
         for sender in self.senders:
             before = sender.text
             sender.step(now, stamp_ns, robot, self._positions)
             if (
-                sender.others_found
+                sender.publishers_found
                 and sender.text != before
-                and NAMELESS not in sender.others_found
+                and NAMELESS not in sender.publishers_found
             ):
                 warn(sender.text)
-        for _, panel in shown:
+        for _, panel in windows:
             panel.show_joints([sender.text for sender in self.senders])
 
     def _processes(self) -> tuple[str, list[list[str]]]:
-        """Return the state of the robot that runs, and a row for each of its processes."""
+        """Return the state of the running robot, and a row for each of its processes."""
         status = _status(self._plan.robot)
         if status is None:
             return f"no robot {self._plan.robot} runs here", []
@@ -218,38 +266,49 @@ class LiveSource(SceneSource):
 
 
 def _status(name: str) -> RobotStatus | None:
-    """Return the state of the robot that runs in this domain, or None."""
+    """Return the state of the robot in this ROS domain, or None."""
     try:
-        domain = domain_of(os.environ)
-        places = [
-            runtime_dir
-            for runtime_dir, _ in running()
-            if runtime_dir.domain == domain and is_meant(runtime_dir, name)
-        ]
-        return ask(places[0], StatusRequest(), RobotStatus) if places else None
+        runtime_dir = _run_of(name)
+        return ask(runtime_dir, StatusRequest(), RobotStatus) if runtime_dir else None
     except (RuntimeDirError, RequestRefusedError, OSError):
         return None
 
 
+def _run_of(name: str) -> RuntimeDir | None:
+    """Return the runtime directory of the robot in this domain; None if it does not run.
+
+    Raises:
+        RuntimeDirError: if the directories cannot be read.
+    """
+    domain = domain_of(os.environ)
+    runs = (runtime_dir for runtime_dir, _ in running())
+    return next((run for run in runs if run.domain == domain and is_meant(run, name)), None)
+
+
+def _adjustment(edge: PlanEdge) -> str:
+    """Return how far the running robot's edge is from the built one."""
+    return f"adjusted by {edge.adjustment.text}" if edge.adjustment else "as built"
+
+
 def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
-    from tfcompose.tf.ros.graph import UNKNOWN_NODE, ids_say_who, writers
+    from tfcompose.tf.ros.graph import UNKNOWN_NODE, gid_identifies_node, writers
     from tfcompose.tf.ros.sensor_data import JointStatePublisher
 
-    own: set[bytes] = set()
+    own_gids: set[bytes] = set()
 
     def make() -> JointStatePublisher:
         publisher = JointStatePublisher(node, tuple(names), topic)
-        own.add(publisher.gid)
+        own_gids.add(publisher.gid)
         return publisher
 
-    def others() -> list[str]:
-        name = "" if ids_say_who(node) else node.get_fully_qualified_name()
-        found = {
+    def other_publishers() -> list[str]:
+        name = "" if gid_identifies_node(node) else node.get_fully_qualified_name()
+        nodes = {
             writer.node
             for writer in writers(node, topic)
-            if writer.gid not in own and writer.node != name
+            if writer.gid not in own_gids and writer.node != name
         }
-        unnamed = [name for name in found if name.endswith(UNKNOWN_NODE)]
-        return sorted([*(found - set(unnamed)), *(NAMELESS for _ in unnamed)])
+        unnamed = [name for name in nodes if name.endswith(UNKNOWN_NODE)]
+        return sorted([*(nodes - set(unnamed)), *(NAMELESS for _ in unnamed)])
 
-    return JointSender(topic, names, make, others)
+    return JointSender(topic, names, make, other_publishers)

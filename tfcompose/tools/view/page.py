@@ -1,7 +1,7 @@
-"""A robot as one page for a pull request or a ticket.
+"""Writer of a robot as a single HTML page, for a pull request or a ticket.
 
-It needs no network: the frames with owners, poses and places, a picture that can be turned in the
-browser, and a slider for each joint.
+The page needs no network. It contains the frames with owners, poses and locations, a picture that
+the user can turn, and a slider for each joint.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Joint, Robot
     from tfcompose.spec.load import Source
 
-#: Decimals of lengths in metres: a hundredth of a millimetre.
+#: The decimals of lengths in metres: lengths are exact to a hundredth of a millimetre.
 _DECIMALS = 5
 
 
 def page_of(robot: Robot, sources: Sequence[Source]) -> str:
-    """Return the page of a robot; ``sources`` are the files that hold its values."""
+    """Return the HTML page of a robot; ``sources`` are the files that contain its values."""
     colours = colours_of(robot)
     tree = FrameTree(robot)
     rows = []
@@ -67,7 +67,7 @@ def _swatch(colour: tuple[int, int, int]) -> str:
 
 
 def _scene(robot: Robot, tree: FrameTree) -> dict[str, Any]:
-    """Return what the page draws: frames, joints and bodies by their indices."""
+    """Return the data that the page draws: frames, joints and bodies, with indices."""
     index = {frame: number for number, frame in enumerate(tree.frames)}
     poses = poses_in_roots(robot, first_positions(robot))
     colours = colours_of(robot)
@@ -140,7 +140,7 @@ def _joint(joint: Joint, numbers: dict[str, int], starts: dict[str, float]) -> d
 def _bodies(robot: Robot) -> Iterator[tuple[str, tuple[int, int, int], Any, Any]]:
     """Yield frame, colour, points (n, 3) in the frame and faces of each shape.
 
-    A link whose visual meshes cannot be read is drawn by its collision shapes.
+    If the visual meshes of a link cannot be read, the page draws its collision shapes.
     """
     for frame, link in robot.links.items():
         shapes = link.visuals
@@ -165,7 +165,7 @@ def _fields(robot: Robot, scale: float) -> Iterator[dict[str, Any]]:
 
 
 def _move_points(pose: Pose, points: Any) -> Any:
-    """Return points (n, 3) of a frame with this pose in the frame above."""
+    """Transform points (n, 3) from a frame to the frame in which it has this pose."""
     rotation = Pose(quat_xyzw=pose.quat_xyzw)
     axes = [(rotation @ Pose(axis)).xyz for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
     return np.asarray(points) @ np.array(axes) + pose.xyz

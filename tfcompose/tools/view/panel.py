@@ -1,4 +1,4 @@
-"""The panel next to the scene: a selected frame, owners, joints, and a mount's pose to edit."""
+"""Panel next to the scene: selected frame, owners, joints, and the pose of a mount to edit."""
 
 from __future__ import annotations
 
@@ -24,51 +24,54 @@ from tfcompose.tools.view.scene import RobotScene, wxyz
 from tfcompose.tools.view.tree_panel import TreePanel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import viser
 
+    from tfcompose.compiler.mounts.edit import Mount
     from tfcompose.model.robot import Joint, Robot
     from tfcompose.tools.view.session import Session
 
-#: The step of the gizmo in millimetres, degrees.
+#: The steps of the gizmo, in millimetres and degrees.
 _SNAP_MM, _SNAP_DEG = 1.0, 1.0
-#: The gizmo of a robot whose largest body is 1 m long, in metres.
+#: The size of the gizmo in metres, for a robot whose largest body is 1 m long.
 _GIZMO_M = 0.25
-#: Sliders of joints move by a tenth of a millimetre or of a degree.
+#: The step and the decimals of joint sliders, in millimetres or degrees.
 _STEP, _DECIMALS = 0.1, 1
-#: The frame in which a pose is shown, unless another is chosen.
+#: The choice for which the panel shows a pose in the parent of its frame.
 _PARENT = "its parent"
-#: The colour of an owner, at the right of the line below it.
+#: HTML for the colour of an owner. It is at the right end of the line of the owner's checkbox.
 _SWATCH = (
     '<div style="position: relative; height: 0"><div style="position: absolute; right: 1em; top:'
     ' 0.15em; width: 4em; height: 0.8em; border-radius: 0.2em; background: {}"></div></div>'
 )
-#: How wide the panel is, in the picture's pixels.
+#: The width of the panel, in CSS pixels.
 _WIDTH_PX = 350
-#: How long a sweep of the joints takes, and the time between two of its steps, in seconds.
+#: The duration of a sweep of the joints, and the time between two steps, in seconds.
 _SWEEP_S, _SWEEP_STEP_S = 6.0, 0.05
 
 
 @dataclass(slots=True)
 class Window:
-    """A window among others on the same files. They save in turn."""
+    """A browser window. Several windows may show the same files; they save one after another."""
 
-    #: The server of the window, which sets where its camera begins; None: all windows share one
+    #: The server of the window, which sets its first camera position; None if all windows share a
     #: panel.
     server: viser.ViserServer | None = None
     #: Held during a save.
     lock: threading.RLock = field(default_factory=threading.RLock)
-    #: Show in the other windows what this one has saved.
+    #: A function that shows a save of this window in all other windows.
     share: Callable[[], None] = lambda: None
-    #: Frames that are moved here and that another window has saved at another pose.
+    #: Lets the source of frames follow the window's moves, and returns lines about that.
+    take_moves: Callable[[], Sequence[str]] = tuple
+    #: Frames that were moved in this window and that another window has saved at another pose.
     conflicts: set[str] = field(default_factory=set)
 
 
 def _snap(pose: Pose, before: Pose) -> Pose:
     """Return a pose in whole mm and degrees.
 
-    A number that is less than half of one off keeps the value before.
+    A number that changes by less than half a step keeps the value of ``before``.
     """
 
     def snap(new: float, old: float, step: float) -> float:
@@ -81,7 +84,7 @@ def _snap(pose: Pose, before: Pose) -> Pose:
 
 
 def _phase(slider: Any) -> float:
-    """Return where a slider is in its sweep, in radians: 0 in its middle."""
+    """Return the phase of a slider in its sweep, in radians; the phase is 0 in the middle."""
     half = (slider.max - slider.min) / 2
     return math.asin(max(-1.0, min(1.0, (slider.value - slider.min) / half - 1)))
 
@@ -89,10 +92,10 @@ def _phase(slider: Any) -> float:
 class Panel:
     """Shows a session on a server.
 
-    With ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved. ``server``
-    may be one client of a server; ``window`` is then its window. ``choices`` are the user's, which
-    the panel changes. ``published`` are the poses of frames in their roots if another source than
-    the session gives them.
+    With ``edit``, the user can move and save mounts. With ``joints``, the user can move joints.
+    ``server`` may be a client of a server; then ``window`` is the window of this client.
+    ``choices`` are the choices of the user, which the panel changes. ``published`` are the poses
+    of frames in the roots of their trees, if these do not come from the session.
     """
 
     def __init__(  # noqa: PLR0913 (where, what and how it is shown)
@@ -113,16 +116,16 @@ class Panel:
         self.positions = self.choices.positions
         self.published: Mapping[str, Pose] | None = None
         self.scene = RobotScene(server.scene, session.robot)
-        #: What the selected mount is dragged by, None where it cannot be moved.
+        #: The gizmo that drags the selected mount; None if the mount cannot be moved.
         self.gizmo: Any = None
         self._numbers: list[Any] = []
-        #: Of joints that follow no other, in degrees or mm.
+        #: The sliders of joints that are not mimic joints, in degrees or mm.
         self.sliders: list[Any] = []
         self._showing = False
         self._blocked: Any = None
-        #: Whether the joints are being moved to and fro.
+        #: Whether the joints are sweeping.
         self.is_sweeping = False
-        #: Whether another panel has taken its place.
+        #: Whether another panel has replaced this panel.
         self.is_gone = False
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
@@ -155,7 +158,7 @@ class Panel:
         threading.Thread(target=self.scene.add_meshes, name="meshes", daemon=True).start()
 
     def _begin(self) -> None:
-        """Show what was chosen."""
+        """Show the user's earlier choices."""
         self.refresh()
         self.tree.mark_moved(frozenset(self.session.moved))
         self.scene.hide(self.tree.hidden)
@@ -166,7 +169,7 @@ class Panel:
         self._show_blocked()
 
     def end(self) -> None:
-        """Stop moving anything: another panel takes over, or none."""
+        """Stop moving frames, because this panel is no longer used."""
         self.is_gone = True
         self.scene.end()
 
@@ -176,7 +179,7 @@ class Panel:
             self.scene.update(self.session.robot, self.poses())
 
     def poses(self) -> Mapping[str, Pose]:
-        """Return the shown pose of each frame, in the root of its tree."""
+        """Return the current pose of each frame, in the root of its tree."""
         return self.published or poses_in_roots(self.session.robot, self.positions)
 
     @property
@@ -240,7 +243,7 @@ class Panel:
         self.scene.show_owner(owner, visible=box.value)
 
     def _add_sensors(self) -> None:
-        """Let the fields of view be shown, and the rays in them that the robot blocks."""
+        """Add switches that show fields of view, and the rays that the robot blocks."""
         fields = self.scene.fields
         for sensor, is_shown in self.choices.sensors.items():
             fields.show(sensor, visible=is_shown)
@@ -248,7 +251,7 @@ class Panel:
             fields.draw(self.choices.reach)
         with self._gui.add_folder("Fields of view"):
             for sensor in fields.sensors:
-                box = self._gui.add_checkbox(sensor, initial_value=fields.shown[sensor])
+                box = self._gui.add_checkbox(sensor, initial_value=fields.visible[sensor])
                 box.on_update(partial(self._show_field, sensor, box))
             reach = self._gui.add_number(
                 "drawn to (m)", fields.reach, min=0.01, max=300.0, step=0.01
@@ -274,7 +277,7 @@ class Panel:
         self._show_blocked()
 
     def _show_blocked(self) -> None:
-        """Draw the rays that are blocked, and say how many, if that is wanted."""
+        """Draw blocked rays and show their number, if the user has chosen this."""
         if self._blocked is not None:
             lines = self.scene.fields.show_blocked(
                 self.session.robot if self._blocked.value else None
@@ -313,7 +316,7 @@ class Panel:
         return slider
 
     def set_joint(self, name: str, position: float) -> None:
-        """Move a joint, in radians or metres."""
+        """Move a joint to a position in radians or metres."""
         self.positions[name] = position
         if not self.is_sweeping:
             self.refresh()
@@ -368,11 +371,13 @@ class Panel:
 
     def _show_moved(self) -> None:
         self.tree.mark_moved(frozenset(self.session.moved))
+        if notices := self.window.take_moves():
+            self.say(paragraphs([escape(notice) for notice in notices]))
         self.refresh()
         self._show_blocked()
 
     def _show_mount(self) -> None:
-        """Show the file's numbers for the selected frame, and a gizmo there."""
+        """Show the numbers of the selected frame's pose in the file, and a gizmo at the frame."""
         if self.gizmo is not None:
             self.gizmo.remove()
             self.gizmo = None
@@ -390,15 +395,15 @@ class Panel:
             [f"pose of <b>{escape(mount.place)}</b> in <b>{escape(mount.relative_to)}</b>"]
         )
         self._fill(pose)
-        at = self.poses()[mount.place]
+        pose_of_mount = self._pose_of(mount)
         scale = _GIZMO_M * self.scene.scale
         self.gizmo = self._server.scene.add_transform_controls(
-            "/gizmo", scale=scale, wxyz=wxyz(at), position=at.xyz
+            "/gizmo", scale=scale, wxyz=wxyz(pose_of_mount), position=pose_of_mount.xyz
         )
         self.gizmo.on_update(lambda event: self._take_dragged() if event.phase == "end" else None)
 
     def _enable(self, *, is_enabled: bool) -> None:
-        """Let the mount be edited, or show its numbers in grey."""
+        """Enable or disable the editing of the mount."""
         for handle in (*self._numbers, self._snap):
             if handle.disabled == is_enabled:
                 handle.disabled = not is_enabled
@@ -428,7 +433,7 @@ class Panel:
         self._show_selected()
 
     def move(self, pose: Pose) -> None:
-        """Give the selected mount the pose to be written to its file."""
+        """Move the selected mount to a pose, which is the pose to write to the file."""
         try:
             mount = self.session.mount(self.selected)
         except ImmovableError as error:
@@ -437,14 +442,18 @@ class Panel:
         self.session.move(mount.edge.child, mount.of_edge(pose))
         self._show_moved()
         if self.gizmo is not None:
-            at = self.poses()[mount.place]
-            self.gizmo.wxyz, self.gizmo.position = wxyz(at), at.xyz
+            pose_of_mount = self._pose_of(self.session.mount(self.selected))
+            self.gizmo.wxyz, self.gizmo.position = wxyz(pose_of_mount), pose_of_mount.xyz
+
+    def _pose_of(self, mount: Mount) -> Pose:
+        """Return the pose of a mount in the root of its tree, as moved here."""
+        return self.poses()[mount.relative_to] @ mount.pose_in_file(mount.edge.pose)
 
     def save(self) -> None:
         """Save the moved mounts, and report the result.
 
-        If another window has meanwhile saved a mount at another pose, report that first; the next
-        save overwrites it.
+        If another window has saved a mount at another pose in the meantime, report this instead.
+        The next save then overwrites the pose.
         """
         with self.window.lock:
             conflicts = sorted(self.window.conflicts & self.session.moved.keys())
@@ -467,6 +476,6 @@ class Panel:
                 self.window.share()
 
     def say(self, html: str) -> None:
-        """Show a report in the section for editing mounts."""
+        """Show a text in the section for editing mounts."""
         if self._numbers:
             self.report.content = html

@@ -1,4 +1,4 @@
-"""Picture of a tree: the pose of each frame in a scene, from its newest transforms."""
+"""Pose of each frame in a scene, computed from the newest transforms of a tree."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _TURNING = frozenset({"revolute", "continuous"})
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """The poses of all frames, in the roots of their trees or in the fixed frame."""
+    """The poses of all frames at a time, in the roots of their trees or in the fixed frame."""
 
     #: The robot with the published parents.
     robot: Robot
-    #: Poses of the robot's frames. A frame that was not published is at its pose in the robot.
+    #: Poses of the robot's frames. A frame without a transform is at its planned pose.
     poses: Mapping[str, Pose]
-    #: Poses of frames that are not the robot's.
+    #: Poses of frames that the robot file does not declare.
     further: Mapping[str, Pose] = field(default_factory=dict)
-    #: Expected poses of frames that are elsewhere, and of all frames below them.
+    #: The expected poses of frames that have another pose, and of all frames below them.
     ghosts: Mapping[str, Pose] = field(default_factory=dict)
     #: Edges (parent, child) with a fault.
     wrong: tuple[tuple[str, str], ...] = ()
@@ -41,8 +41,9 @@ class Picture:
 class Pictures:
     """Makes pictures of a robot.
 
-    Frames have the names of its file, which may differ on the tree. Frames in one tree with the
-    ``fixed`` frame are shown in that frame; empty: in their root.
+    Frames have their names from the robot file, which may differ from their names in the running
+    tree. The poses of frames in the tree of ``fixed`` are relative to this frame. If ``fixed`` is
+    empty, and in other trees, poses are relative to the root.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -50,18 +51,21 @@ class Pictures:
         self.fixed = ""
         self.edges = {
             edge.child: edge for edge in reversed(robot.edges)
-        }  # of several parents the first
+        }  # a frame with several parents uses the first
         self._names = {robot.final(frame): frame for frame in robot.frames}
         self._rows: dict[str, Row] = {}
         self._judged: object = None
         self._grow({edge.child: edge.parent for edge in self.edges.values()})
 
     def name(self, frame: str) -> str:
-        """Return the robot file's name for a frame on the tree; other frames keep theirs."""
+        """Return the name in the robot file for a frame of the tree.
+
+        A frame that is not in the robot file keeps its name.
+        """
         return self._names.get(frame, frame)
 
     def next(self, newest: Mapping[str, Row], judgement: Judgement) -> Picture | None:
-        """Return the newest transforms by frame, or None if nothing changed."""
+        """Return a picture of the newest transforms, or None if nothing changed."""
         parents = {edge.child: edge.parent for edge in self.edges.values()}
         parents |= {child: self.name(row[0].removeprefix("/")) for child, row in newest.items()}
         if parents != self._parents or not self._rows.keys() <= newest.keys():
@@ -78,7 +82,7 @@ class Pictures:
         return self._picture(judgement)
 
     def _grow(self, parents: dict[str, str]) -> None:
-        """Take the parents of frames, and begin with the poses that the robot has."""
+        """Set the parents of frames, and start with the planned poses."""
         self._parents = parents
         frames = dict.fromkeys([*self.robot.frames, *parents, *parents.values()])
         self._forest = FrameForest(tuple(frames), parents)
@@ -90,27 +94,29 @@ class Pictures:
         edges = tuple(
             replace(edge, parent=parents.get(edge.child, edge.parent)) for edge in self.robot.edges
         )
-        self._shown = replace(self.robot, edges=edges)
+        self._robot_of_edges = replace(self.robot, edges=edges)
 
     def _picture(self, judgement: Judgement) -> Picture:
         in_roots = self._forest.in_roots(self._local)
         rows = self._transform_to_fixed(in_roots, in_roots)
         placed = dict(zip(self._forest.frames, poses_of(rows), strict=True))
-        known = self.robot.frames
-        poses = {frame: placed[frame] for frame in known}
-        further = {frame: pose for frame, pose in placed.items() if frame not in known}
+        frames = self.robot.frames
+        poses = {frame: placed[frame] for frame in frames}
+        further = {frame: pose for frame, pose in placed.items() if frame not in frames}
         wrong = tuple(
             (self._parents[frame], frame)
             for frame in sorted(judgement.wrong)
             if frame in self._parents
         )
-        return Picture(self._shown, poses, further, self._ghosts(judgement, in_roots), wrong)
+        return Picture(
+            self._robot_of_edges, poses, further, self._ghosts(judgement, in_roots), wrong
+        )
 
-    def _transform_to_fixed(self, in_roots: Rows, others: Rows) -> Rows:
+    def _transform_to_fixed(self, in_roots: Rows, poses: Rows) -> Rows:
         return (
-            self._forest.in_frame(self.fixed, in_roots, others)
+            self._forest.in_frame(self.fixed, in_roots, poses)
             if self.fixed in self._forest.index
-            else others
+            else poses
         )
 
     def _ghosts(self, judgement: Judgement, in_roots: Rows) -> dict[str, Pose]:
@@ -130,9 +136,9 @@ class Pictures:
         }
 
     def _planned_pose(self, child: str, live: Pose) -> Pose:
-        """Return where the robot has the frame in its parent.
+        """Return the planned pose of a frame in its parent.
 
-        What a joint moves is where it was published.
+        If a joint moves the frame, return the pose for the published joint position.
         """
         edge = self.edges[child]
         if edge.joint is None:
@@ -143,7 +149,7 @@ class Pictures:
 
 
 class ShownTree(ABC):
-    """A tree of transforms, shown and judged: live, or at a time of a recording."""
+    """A tree of transforms with findings: a running tree, or a recording at a time."""
 
     judgement: Judgement
 
@@ -153,7 +159,7 @@ class ShownTree(ABC):
 
     @property
     def fixed(self) -> str:
-        """The frame in which its tree is shown; empty: the root."""
+        """The frame in which the poses of its tree are shown; empty for the root."""
         return self._pictures.fixed
 
     @fixed.setter
@@ -164,9 +170,15 @@ class ShownTree(ABC):
         """Return all poses if a frame moved or its judgement changed, else None."""
         return self._pictures.next(self._newest(), self.judgement)
 
+    def show_robot(self, robot: Robot) -> None:
+        """Show another version of the robot, with the same frames and other poses."""
+        self.robot = robot
+        fixed, self._pictures = self.fixed, Pictures(robot)
+        self.fixed = fixed
+
     @abstractmethod
     def about(self, frame: str) -> list[str]:
-        """Return text about the edge above a frame, then findings."""
+        """Return text about the edge above a frame, then its findings."""
 
     @abstractmethod
     def _newest(self) -> Mapping[str, Row]:

@@ -1,6 +1,6 @@
-"""A built plan as a robot for the view.
+"""Conversion of a built plan to a robot for the view.
 
-It has the plan's edges, and bodies and joint limits from the description.
+The robot has the edges of the plan. Its bodies and joint limits come from the URDF.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 
 def robot_of_plan(plan: Plan, description: str | None, file: str, find: Finder) -> Robot:
-    """Return the robot that a plan describes, frames named as on the live tree.
+    """Return the robot that a plan describes.
 
-    ``description`` is the text of the URDF next to the plan in ``file``, None without one;
-    ``find`` looks up its meshes.
+    Frames have their names of the running tree. ``description`` is the text of the URDF next to
+    the plan ``file``, or None if there is none. ``find`` finds the meshes of the URDF.
 
     Raises:
-        RejectedError: if that is no URDF.
+        RejectedError: if the text is not a URDF.
     """
     links: dict[str, Link] = {}
     limits: dict[str, Limit | None] = {}

@@ -1,4 +1,4 @@
-"""Published tree of a running or recorded robot: frames, ghosts, findings and processes."""
+"""Panel section for the tree of a running or recorded robot."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from tfcompose.tools.view.picture import Picture, ShownTree
 
 _RED = (220, 30, 30)
-#: Of the names of frames that nobody declared so many are shown.
+#: The maximum number of undeclared frames whose names the view shows.
 _MOST = 40
 
 
 class PublishedTree:
-    """The panel's section about the running or recorded tree of its robot."""
+    """Shows the frames, expected poses, findings and processes of a running or recorded robot."""
 
     def __init__(
         self,
@@ -39,9 +39,9 @@ class PublishedTree:
         self._ghosts = Ghosts(server.scene, tree.robot)
         self._wrong = _ColouredLines(server.scene, "/live/wrong", _RED)
         self._further: dict[str, Any] = {}
-        #: The slider of a recording's time, in seconds; None: the tree runs.
+        #: The time slider of a recording, in seconds; None for a running tree.
         self.time: Any = None
-        fixed = panel.choices.fixed or tree.robot.base  # what drives off stays in the picture
+        fixed = panel.choices.fixed or tree.robot.base  # keeps a driving robot in view
         tree.fixed = fixed if fixed in tree.robot.frames else tree.robot.roots()[0]
         with server.gui.add_folder(title, order=-1):
             self.fixed: Any = server.gui.add_dropdown(
@@ -58,7 +58,7 @@ class PublishedTree:
         self.tree.fixed = self._panel.choices.fixed = self.fixed.value
 
     def show(self) -> None:
-        """Update the scene to the current tree; unchanged frames send nothing."""
+        """Update the scene to the current tree; send only frames that have changed."""
         picture = self.tree.next_picture()
         if picture is None:
             return
@@ -79,7 +79,7 @@ class PublishedTree:
         _set(self._found, findings_html(self.tree.judgement.findings, self.tree.judgement.summary))
 
     def show_joints(self, lines: Sequence[str]) -> None:
-        """Show whether sliders publish joint states, or which node does instead."""
+        """Show if sliders publish joint states, or which other node does."""
         _set(self._joints, paragraphs([escape(line) for line in lines]))
 
     def show_processes(self, title: str, rows: Sequence[Sequence[str]]) -> None:
@@ -87,7 +87,7 @@ class PublishedTree:
         _set(self._processes, _table(title, rows))
 
     def _show_further(self, picture: Picture) -> None:
-        """Show frames that nobody declared, by their names."""
+        """Show undeclared frames with their names."""
         for frame in self._further.keys() - picture.further.keys():
             self._further.pop(frame).remove()
         for number, (frame, pose) in enumerate(picture.further.items()):
@@ -99,7 +99,7 @@ class PublishedTree:
 
 
 class _ColouredLines:
-    """Lines of one colour, as many as there are just now."""
+    """A varying number of lines with the same colour."""
 
     def __init__(self, scene: viser.SceneApi, name: str, colour: tuple[int, int, int]) -> None:
         self._scene = scene
@@ -109,7 +109,7 @@ class _ColouredLines:
         self._points = np.zeros((0, 2, 3), np.float32)
 
     def show(self, points: Any) -> None:
-        """Show lines between these ends, shape (lines, 2, 3)."""
+        """Show lines between end points, an array of shape (lines, 2, 3)."""
         if np.array_equal(points, self._points):
             return
         if self._handle is not None and len(points) != len(self._points):

@@ -1,6 +1,6 @@
-"""Shows a file again when it changes on disk.
+"""Reload of a view when files change on disk.
 
-While it is broken, the last valid scene stays, with the findings.
+While the files have errors, the view keeps the last valid scene and shows the findings.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Robot
     from tfcompose.tools.view.session import Session
 
-#: What changes together is one change, in milliseconds.
+#: Changes within this time in milliseconds count as a single change.
 _TOGETHER_MS = 100
 
 
 class WatchedFiles:
-    """Reads files, and remembers their contents.
+    """Reads files and remembers their contents, to find changes.
 
-    For meshes, it remembers the time of their last change.
+    For a mesh, it remembers the time of the last change instead.
     """
 
     def __init__(self, read: Callable[[str], str]) -> None:
@@ -44,29 +44,29 @@ class WatchedFiles:
         self._meshes: dict[str, int] = {}
 
     def __call__(self, file: str) -> str:
-        """Return the text of a file; raises what reading raises."""
-        self._texts.setdefault(file, "")  # one that is not there yet may come
+        """Return the text of a file; raise the exceptions of the reader."""
+        self._texts.setdefault(file, "")  # the file may be created later
         text = self._texts[file] = self._read(file)
         return text
 
     def wrote(self, file: str, text: str) -> None:
-        """Remember a text just written to the file, so that it is not a change."""
+        """Remember a text that the view has written, so that it does not count as a change."""
         self._texts[file] = text
 
     def look_at(self, meshes: Iterable[str]) -> None:
-        """Remember these mesh files, and no others, with the times of their last changes."""
+        """Remember the times of the last changes of these mesh files, and forget other meshes."""
         self._meshes = {file: _mtime_ns(file) for file in meshes}
 
     @property
     def folders(self) -> set[Path]:
-        """The folders of all files read, because editors replace files."""
+        """The folders of all files. The watcher watches folders, because editors replace files."""
         files = (*self._texts, *self._meshes)
         return {
             folder for file in files if is_folder(folder := Path(os.path.realpath(file)).parent)
         }
 
     def differ(self) -> bool:
-        """Return whether a file's text differs from the one read, or a mesh has changed."""
+        """Return whether a file's text or a mesh has changed since it was read."""
         return any(self._now(file) != text for file, text in self._texts.items()) or any(
             _mtime_ns(file) != before for file, before in self._meshes.items()
         )
@@ -86,7 +86,10 @@ def _mtime_ns(file: str) -> int:
 
 
 class Watcher:
-    """Sets ``changed`` when watched files change, in its own thread, within ``with``."""
+    """Sets ``changed`` when watched files change.
+
+    It watches in its own thread, inside a ``with`` block.
+    """
 
     def __init__(self, files: WatchedFiles) -> None:
         self.changed = threading.Event()
@@ -130,13 +133,10 @@ def meshes_of(robot: Robot) -> set[str]:
 
 
 class ReloadedPanel:
-    """The panel of a session, made anew with each valid version of its files.
+    """The panel of a session, rebuilt for each valid version of its files.
 
-    Args:
-        server: where it is shown, or the window of it.
-        session: what is shown.
-        files: what the session was read with.
-        options: as for ``Panel``.
+    ``server`` is the server or the window that shows the panel. ``files`` read the files of the
+    session. ``options`` are the options of ``Panel``.
     """
 
     def __init__(
@@ -155,7 +155,7 @@ class ReloadedPanel:
         files.look_at(meshes_of(session.robot))
 
     def accept(self, texts: Mapping[str, str], state: Compiled) -> bool:
-        """Show the current files, or findings about them.
+        """Show the current files or, if they have errors, the findings.
 
         Return whether there is a new panel.
         """
@@ -177,11 +177,8 @@ class ReloadedPanel:
         return True
 
     @property
-    def found(self) -> str:
-        """The findings about the current files, as HTML.
-
-        Empty if there are none.
-        """
+    def report(self) -> str:
+        """The findings about the current files as HTML; empty if there are none."""
         return self._broken.content if self._broken else ""
 
     def show(self, findings: tuple[Finding, ...]) -> None:

@@ -1,4 +1,4 @@
-"""A robot as a viser scene: bodies, frames as axes, and edges as lines in owners' colours."""
+"""Scene of a robot in viser: bodies, frames as axes, edges as lines in owners' colours."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import Robot, Shape
 
-#: Where a colour begins on the wheel, and how far the next one is: the golden angle keeps
-#: neighbours apart. Reds are left out at both ends, as they say that an edge is wrong.
+#: The first hue, and the step to the next one. With the golden angle as the step, colours of
+#: consecutive owners differ clearly. Red hues are not used, because red marks a wrong edge.
 _FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
 _NO_RED = 0.1
 _GREY = (105, 112, 122)
-#: The axes of a robot whose largest body is 1 m long, in metres.
+#: The length of axes in metres, for a robot whose largest body is 1 m long.
 AXES_M = 0.08
-#: How much larger the axes of the selected frame are.
+#: The factor by which the axes of the selected frame are longer.
 _SELECTED = 2.0
 _GHOST = (60, 120, 220)
 _RULER = (20, 20, 20)
 
 
 def wxyz(pose: Pose) -> tuple[float, float, float, float]:
-    """Return the rotation in viser's order."""
+    """Return the rotation of a pose as a quaternion in viser's order (w, x, y, z)."""
     x, y, z, w = pose.quat_xyzw
     return (w, x, y, z)
 
@@ -55,7 +55,7 @@ def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
 
 
 def colour_of(shape: Shape) -> tuple[int, int, int]:
-    """Return the colour of a shape's material, grey without one."""
+    """Return the colour of a shape's material; grey if it has none."""
     rgba = shape.material.rgba if shape.material else None
     if rgba is None:
         return _GREY
@@ -65,7 +65,8 @@ def colour_of(shape: Shape) -> tuple[int, int, int]:
 def scale_of(sides: Iterable[float]) -> float:
     """Return the scale of axes and other marks; 1 for a robot whose largest body is 1 m.
 
-    It is the square root of the longest of the bodies' ``sides``, in metres.
+    The scale is the square root of the longest of ``sides``, in metres, which are the sides of
+    bodies.
     """
     return math.sqrt(max(sides, default=1.0) or 1.0)
 
@@ -73,7 +74,7 @@ def scale_of(sides: Iterable[float]) -> float:
 def _add_shape(
     scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int, int, int], opacity: float
 ) -> Any:
-    """Add a shape to the scene; return its mesh and handle, or None if it is empty."""
+    """Add a shape to the scene. Return its mesh and handle, or None if it is empty."""
     mesh = mesh_of(shape)
     if mesh is None or mesh.is_empty:
         return None
@@ -94,10 +95,10 @@ def _add_shape(
 
 
 class RobotScene:
-    """The scene of one robot; ``update`` moves it.
+    """The scene of a robot; ``update`` moves its frames.
 
-    Reading the meshes of an arm takes seconds. A link with collision shapes shows these until
-    ``add_meshes`` has read its visual meshes.
+    It takes seconds to read the meshes of an arm. Therefore a link with collision shapes shows
+    these until ``add_meshes`` has read its visual meshes.
     """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
@@ -118,10 +119,10 @@ class RobotScene:
         self._names_all = False
         self._measured: tuple[str, ...] = ()
         self._ruler: Any = None
-        #: What is called with the frame of a body that is clicked.
+        #: A function that is called with the frame of a body when the user clicks the body.
         self.clicked: Callable[[str], None] = lambda _: None
         scene.set_up_direction("+z")
-        with contextlib.suppress(AttributeError):  # those of a window are its server's
+        with contextlib.suppress(AttributeError):  # a window has no world axes; its server has
             scene.world_axes.visible = False
         for index, (frame, link) in enumerate(robot.links.items()):
             shapes = link.visuals or link.collisions
@@ -160,7 +161,7 @@ class RobotScene:
                     handle.remove()
 
     def end(self) -> None:
-        """Stop ``add_meshes`` from changing anything: another scene takes over, or none."""
+        """Stop ``add_meshes``, because this scene is no longer used."""
         with self._lock:
             self._is_gone = True
 
@@ -179,11 +180,15 @@ class RobotScene:
         return handles
 
     def update(self, robot: Robot, poses: Mapping[str, Pose]) -> None:
-        """Move every frame to its pose in the root of its tree."""
+        """Move every frame.
+
+        ``poses`` are poses of frames in the roots of their trees.
+        """
         for frame, body in self._bodies.items():
             if poses[frame] != self._at.get(frame):
                 body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
-        for frame, label in self._labels.items():
+        # A copy: a window adds labels in a thread of its own, while the live tree moves them.
+        for frame, label in tuple(self._labels.items()):
             if poses[frame] != self._at.get(frame):
                 label.position = poses[frame].xyz
         self._robot, self._at = robot, poses
@@ -208,10 +213,10 @@ class RobotScene:
             self._draw_measured()
 
     def _draw_edges(self) -> None:
-        poses, shown = self._at, self._at.keys() - self._hidden
+        poses, visible = self._at, self._at.keys() - self._hidden
         ends: dict[str, list[tuple[Vector, Vector]]] = {owner: [] for owner in self.colours}
         for edge in self._robot.edges:
-            if edge.parent in poses and edge.child in shown:
+            if edge.parent in poses and edge.child in visible:
                 ends[edge.owner].append((poses[edge.parent].xyz, poses[edge.child].xyz))
         for index, (owner, colour) in enumerate(self.colours.items()):
             points = np.array(ends[owner], np.float32).reshape(-1, 2, 3)
@@ -263,7 +268,7 @@ class RobotScene:
             )
 
     def hide(self, frames: Iterable[str]) -> None:
-        """Hide these frames with bodies, labels and edges, and show all others."""
+        """Hide these frames, with their bodies, labels and edges; show all other frames."""
         self._hidden = frozenset(frames)
         for frame, handle in (*self._bodies.items(), *self._labels.items()):
             handle.visible = frame not in self._hidden
@@ -272,7 +277,7 @@ class RobotScene:
         self.fields.hide(self._hidden)
 
     def select(self, frame: str) -> None:
-        """Draw the axes of a frame larger than all others, with its name."""
+        """Draw the axes of a frame longer than all others, and show its name."""
         self._selected = frame
         self._axes.batched_scales = self._scales()
         self._label()
@@ -320,29 +325,32 @@ class RobotScene:
 
 
 class Ghosts:
-    """Bodies and axes at the expected poses of frames that are elsewhere."""
+    """Transparent bodies and axes at the expected poses of frames that are elsewhere."""
 
     def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
         self._scene = scene
         self._links = robot.links
         self._names = {frame: f"/ghost/{index}" for index, frame in enumerate(robot.frames)}
-        self._shown: dict[str, Any] = {}
+        self._axes: dict[str, Any] = {}
 
     def show(self, poses: Mapping[str, Pose]) -> None:
-        """Show only these frames, at their poses in the roots of their trees."""
-        for frame in self._shown.keys() - poses.keys():
-            self._shown.pop(frame).remove()
+        """Show only these frames.
+
+        ``poses`` are poses of frames in the roots of their trees.
+        """
+        for frame in self._axes.keys() - poses.keys():
+            self._axes.pop(frame).remove()
         for frame, name in self._names.items():
             if frame not in poses:
                 continue
-            if frame not in self._shown:
-                self._shown[frame] = self._scene.add_frame(
+            if frame not in self._axes:
+                self._axes[frame] = self._scene.add_frame(
                     name, axes_length=AXES_M / 2, axes_radius=AXES_M / 40
                 )
                 link = self._links.get(frame)
                 for number, shape in enumerate((link.visuals or link.collisions) if link else ()):
                     _add_shape(self._scene, f"{name}/{number}", shape, _GHOST, 0.25)
-            self._shown[frame].wxyz, self._shown[frame].position = (
+            self._axes[frame].wxyz, self._axes[frame].position = (
                 wxyz(poses[frame]),
                 poses[frame].xyz,
             )

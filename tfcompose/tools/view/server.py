@@ -1,4 +1,4 @@
-"""Server of the browser view: it admits only windows with its token, and only viser's messages."""
+"""Server of the browser view, which accepts only windows with its token."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ from websockets.http11 import Request, Response
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-#: With 256 bits nobody guesses a token.
+#: The length of a token: nobody can guess 256 bits.
 _TOKEN_BYTES = 32
-#: Of websockets, without the traceback of each stranger that connects and sends no request.
+#: Logger for websockets. Its default logger prints a traceback for each connection without a
+#: request.
 _LOGGER = logging.getLogger(__name__)
 _LOGGER.addFilter(lambda record: record.msg != "opening handshake failed")
 
@@ -37,12 +38,13 @@ def new_token() -> str:
 
 
 def start_server(host: str, port: int, name: str, token: str) -> viser.ViserServer:
-    """Return a server at a free port; 0 takes any.
+    """Start a server on a free port, and return it; port 0 means any port.
 
-    Page and websocket require the ``token``: other users of the machine, pages of other sites and
-    port scanners get 403 and nothing about the robot. The token is in the address of the page,
-    ``?token=``, and then in a cookie, because viser's page opens its websocket without a query.
-    viser has no setting for this, so it is started with a replacement for websockets' ``serve``.
+    The page and the websocket require the ``token``. Other users of the machine, pages of other
+    sites and port scanners get the status 403 and no data about the robot. The token is in the URL
+    of the page, ``?token=``. It is then also in a cookie, because viser's page opens its websocket
+    without a query. viser has no setting for this. Therefore this function replaces ``serve`` of
+    websockets while it starts viser.
     """
     serve = websockets.asyncio.server.serve
 
@@ -53,7 +55,7 @@ def start_server(host: str, port: int, name: str, token: str) -> viser.ViserServ
 
     websockets.asyncio.server.serve = serve_guarded  # type: ignore[assignment,misc]
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # its banner
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
             return viser.ViserServer(host, port, label=name, verbose=False)
     finally:
         websockets.asyncio.server.serve = serve  # type: ignore[misc]
@@ -66,10 +68,10 @@ def stop_server(server: viser.ViserServer) -> None:
 
 
 class _Connection(ServerConnection):
-    """A websocket that ends where it receives anything but a message of viser's."""
+    """A websocket that closes if it receives a message that is not viser's."""
 
     async def recv(self, decode: bool | None = None) -> Any:  # noqa: FBT001 (as the base has it)
-        """Return the next message; raises ConnectionClosed after one that is none."""
+        """Return the next message; raise ConnectionClosed if it is not viser's."""
         data = await super().recv(decode)
         try:
             if isinstance(data, bytes):
@@ -87,13 +89,13 @@ def _admit(
     connection: Any,
     request: Request,
 ) -> Response | None:
-    """Answer a request with the token, in its address or in the cookie.
+    """Answer a request that has the token in its URL or in the cookie.
 
-    Refuse others, and pages of other sites.
+    Refuse all other requests, and requests from pages of other sites.
     """
     headers = request.headers
     port = urlsplit(f"//{headers.get('Host', '')}").netloc.rpartition(":")[2]
-    cookie = f"tfcompose_view_{port}"  # browsers send cookies of a host to all of its ports
+    cookie = f"tfcompose_view_{port}"  # a host's cookies go to all its ports
     in_address = parse_qs(urlsplit(request.path).query).get("token", [""])[-1]
     origin = headers.get("Origin")
     is_own_page = origin is None or urlsplit(origin).netloc == headers.get("Host")
@@ -105,7 +107,7 @@ def _admit(
         return _refuse(http.HTTPStatus.FORBIDDEN, "open the address with its token")
     try:
         response = answer(connection, request)
-    except OSError:  # the path is no name of a file
+    except OSError:  # the path is not a valid file name
         return _refuse(http.HTTPStatus.NOT_FOUND, "there is no such file")
     if response is not None:
         response.headers["Set-Cookie"] = f"{cookie}={token}; HttpOnly; SameSite=Strict; Path=/"

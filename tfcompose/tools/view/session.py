@@ -1,4 +1,4 @@
-"""One robot file that is shown and edited: moved poses, undo, and saving."""
+"""Session of a robot in the view: moved poses, undo, and saving."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Saved:
 
     diff: str = ""
     findings: tuple[Finding, ...] = ()
-    #: New errors because of which nothing was saved.
+    #: New errors that prevented the save.
     refused: tuple[Finding, ...] = ()
-    #: Poses that no edit can set.
+    #: Poses that no edit of the files can set.
     elsewhere: tuple[Elsewhere, ...] = ()
 
 
@@ -37,30 +37,31 @@ class Saved:
 class Session:
     """A robot with moved mounts."""
 
-    #: The editable files, the robot's own one first.
+    #: The texts of editable files by name; the robot file is first.
     texts: Mapping[str, str]
-    #: Compile texts that are not written yet.
+    #: A function that compiles texts without writing them.
     compiled: Callable[[Mapping[str, str]], Compiled]
-    #: Replace a file's old text with the new one. Arguments: file, old text, new text.
+    #: A function that replaces a file's old text by a new text. Its arguments are the file, the
+    #: old text and the new text.
     write: Callable[[str, str, str], None]
     #: The result of compiling ``texts``, if it is available.
-    known: InitVar[Compiled | None] = None
+    already_compiled: InitVar[Compiled | None] = None
     #: The compiled ``texts``.
     state: Compiled = field(init=False)
-    #: The new pose in its parent, by frame.
+    #: The new poses of moved frames in their parents, by frame.
     moved: dict[str, Pose] = field(default_factory=dict)
     _undo: list[dict[str, Pose]] = field(default_factory=list)
     _redo: list[dict[str, Pose]] = field(default_factory=list)
 
-    def __post_init__(self, known: Compiled | None) -> None:
-        self.state = self.compiled(self.texts) if known is None else known
+    def __post_init__(self, already_compiled: Compiled | None) -> None:
+        self.state = self.compiled(self.texts) if already_compiled is None else already_compiled
 
     @property
     def robot(self) -> Robot:
         """The robot with its moved mounts.
 
         Raises:
-            ValueError: if the files did not get as far as a robot.
+            ValueError: if the files have errors and give no robot.
         """
         if self.state.robot is None:
             raise ValueError("the files give no robot")
@@ -71,13 +72,13 @@ class Session:
         return replace(self.state.robot, edges=tuple(edges))
 
     def fork(self) -> Session:
-        """Return a session on the same files, in which nothing is moved."""
+        """Return a session on the same files, without moved frames."""
         return Session(self.texts, self.compiled, self.write, self.state)
 
     def read_again(self, read: Callable[[str], str]) -> tuple[dict[str, str], Compiled]:
-        """Return the current files and the result of compiling them.
+        """Return the current texts and the result of compiling them.
 
-        No files if one cannot be read.
+        If a file cannot be read, return no texts.
         """
         try:
             texts = {file: read(file) for file in self.texts}
@@ -86,15 +87,16 @@ class Session:
             return {}, Compiled(None, error.findings)
 
     def accepts(self, state: Compiled) -> bool:
-        """Return whether changed files can be shown.
+        """Return whether the view can show changed files.
 
-        They must give a robot, and not add errors to a robot without errors.
+        They must give a robot. If the robot had no errors before, the changed files must also have
+        none.
         """
         got_worse = bool(state.errors and not self.state.errors)
         return state.robot is not None and bool(state.robot.frames) and not got_worse
 
     def replace(self, texts: Mapping[str, str], state: Compiled) -> None:
-        """Continue with files that changed on disk, and the result of compiling them.
+        """Use files that changed on disk, and the result of compiling them.
 
         Moves of removed frames are lost.
         """
@@ -105,9 +107,12 @@ class Session:
         self._redo.clear()
 
     def mount(self, child: str) -> Mount:
-        """Return the file's pose for the edge above a frame; raises ImmovableError.
+        """Return the pose in the file for the edge above a frame.
 
-        A frame inside a sensor moves with the sensor, unless the file gives its own pose.
+        If the file contains no pose for a frame inside a sensor, the frame moves with the sensor.
+
+        Raises:
+            ImmovableError: if the view cannot move the frame.
         """
         robot, source = self.robot, self.state.sources[0]
         mount = mount_of(robot, source, child)
@@ -120,10 +125,17 @@ class Session:
         return mount
 
     def move(self, child: str, pose: Pose) -> None:
-        """Move the frame to a pose in its parent; ``undo`` reverts it."""
+        """Move a frame to a pose in its parent; ``undo`` reverts the move."""
         self._undo.append(dict(self.moved))
         self._redo.clear()
         self.moved[child] = pose
+
+    @property
+    def touched(self) -> frozenset[str]:
+        """The frames that are moved, or were and can be again by ``undo`` or ``redo``."""
+        return frozenset(
+            child for step in (self.moved, *self._undo, *self._redo) for child in step
+        )
 
     def undo(self) -> bool:
         """Revert the last move; False if there is none."""
@@ -133,18 +145,18 @@ class Session:
         """Repeat the move that was reverted last; False if there is none."""
         return self._step(self._redo, self._undo)
 
-    def _step(self, there: list[dict[str, Pose]], back: list[dict[str, Pose]]) -> bool:
-        if there:
-            back.append(self.moved)
-            self.moved = there.pop()
+    def _step(self, source: list[dict[str, Pose]], target: list[dict[str, Pose]]) -> bool:
+        if source:
+            target.append(self.moved)
+            self.moved = source.pop()
             return True
         return False
 
     def save(self) -> Saved:
-        """Write the moved poses to the files that hold them, unless that adds an error.
+        """Write the moved poses to the files that contain them, unless this adds an error.
 
         Raises:
-            OSError: if a file cannot be written, or was changed meanwhile.
+            OSError: if a file cannot be written, or has changed in the meantime.
         """
         texts, state, elsewhere = dict(self.texts), self.state, dict[str, Elsewhere]()
         for child, pose in self.moved.items():
@@ -175,7 +187,7 @@ class Session:
         return Saved(diff, state.findings, elsewhere=tuple(elsewhere.values()))
 
     def _keep_undo(self, saved: AbstractSet[str]) -> None:
-        """Let undo and redo lead to where frames were before the save."""
+        """Keep the earlier poses, so that undo and redo also revert the save."""
         edges = self.state.robot.edges if self.state.robot else ()
         before = {edge.child: edge.pose for edge in reversed(edges) if edge.child in saved}
         for step in (*self._undo, *self._redo):

@@ -1,4 +1,4 @@
-"""The triangles of shapes, reduced for a browser."""
+"""Triangles of shapes, reduced in number for a browser."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import Shape
 
-#: A mesh file with more triangles is drawn with so many: an arm with seven links stays below 2 MB
-#: of a page.
+#: The maximum number of triangles of a mesh. The page of an arm with seven links is then smaller
+#: than 2 MB.
 MOST_TRIANGLES = 20_000
 
 
 def mesh_of(shape: Shape) -> Any:
-    """Return the triangles of a shape in its own frame, a ``trimesh.Trimesh`` in metres.
+    """Return the triangles of a shape in the shape's frame, as a ``trimesh.Trimesh`` in metres.
 
     A mesh file with more than ``MOST_TRIANGLES`` is decimated to that number (quadric error
-    metrics, Garland and Heckbert 1997). None: the file is missing or cannot be read.
+    metrics, Garland and Heckbert 1997). Return None if the file is missing or cannot be read.
     """
     size = shape.size
     if shape.kind == "box":
@@ -45,6 +45,6 @@ def mesh_of(shape: Shape) -> Any:
 def _decimate(path: str, scale: Vector, _changed_ns: int) -> Any:
     mesh = read_mesh(path, scale)
     if len(mesh.faces) > MOST_TRIANGLES:
-        mesh.merge_vertices()  # an STL file has each corner of each triangle by itself
+        mesh.merge_vertices()  # an STL file repeats a vertex for each of its triangles
         mesh = mesh.simplify_quadric_decimation(face_count=MOST_TRIANGLES)
     return mesh

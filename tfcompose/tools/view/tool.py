@@ -1,4 +1,4 @@
-"""View tool: a robot in the browser."""
+"""The tool ``view``: a robot in the browser."""
 
 from tfcompose.foundation.tool import Command, Tool
 

@@ -1,7 +1,8 @@
-"""The panel of frames, left of the scene: a tree to search, select, open, close and hide.
+"""Panel of frames at the left of the scene: a tree to search, select, open, close and hide.
 
-A viser control for each of a thousand frames would take seconds, so the tree is one HTML element.
-Clicks in it come back as the text of a hidden field below it.
+viser needs seconds to create a control for each of a thousand frames. Therefore the tree is a
+single HTML element. A click in the tree changes the text of a hidden field below it, and viser
+reports this text.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ div:has(> .tf-frames) + div { display: none }
 .tf-row button b { color: #e8590c }
 .tf-row mark { background: #ffd43b80; color: inherit }
 </style>"""
-#: Sends [what, frame, when] by the field below the tree: the time makes that another text each
-#: time.
+#: JavaScript that writes [action, frame, time] into the hidden field. The time makes each text
+#: different, because viser reports only changes.
 _SEND = """
 const send = (what, frame) => {
   const field = this.parentElement.nextElementSibling.querySelector('input');
@@ -83,13 +84,15 @@ if (step || opens) {
   if (opens && at >= 0 && rows[at].ariaExpanded === opens) send('open', rows[at].dataset.frame);
 }"""
 )
-#: The tree loses the keys when something else gets them, not when it is replaced.
+#: JavaScript that notes when the tree loses the keyboard focus to another element. It ignores the
+#: replacement of the tree.
 _LEFT = """
 const place = this.parentElement;
 setTimeout(() => { if (this.isConnected) delete place.dataset.hasKeys })"""
-#: What scrolls to the selected row, or to what is found first, when the tree is put into the page,
-#: where scripts do not run, and has the next keys go to the tree if the one before did. It names
-#: the window after the robot, too.
+#: JavaScript that runs when the tree is put into the page. It is in ``onerror`` of an image,
+#: because the page does not run scripts of inserted HTML. It scrolls to the selected row or the
+#: first match, gives the tree the keyboard focus if the replaced tree had it, and sets the title
+#: of the window.
 _PLACED = """<img hidden src="data:," onerror="
 document.title = this.dataset.robot;
 const tree = this.closest('.tf-frames'), selected = tree.querySelector('[aria-selected=true]');
@@ -102,13 +105,10 @@ _NO_OWNER = (134, 142, 150)
 
 
 class TreePanel:
-    """Shows a robot's frames as a tree, and keeps the user's choices in ``choices``.
+    """Shows the frames of a robot as a tree.
 
-    Args:
-        gui: where it is shown.
-        robot: whose frames.
-        colours: of the owners of edges.
-        choices: what is shown, and changed.
+    ``gui`` is the part of the page for the tree. ``colours`` are the colours of owners. The panel
+    reads the user's choices from ``choices`` and stores them there.
     """
 
     def __init__(
@@ -148,11 +148,11 @@ class TreePanel:
         return self.tree.hidden_frames(self._choices.is_shown)
 
     def on_select(self, call: Callable[[], None]) -> None:
-        """Call this function when another frame is selected."""
+        """Call a function when another frame is selected."""
         self._on_select.append(call)
 
     def on_show(self, call: Callable[[], None]) -> None:
-        """Call this function when frames are hidden or shown."""
+        """Call a function when frames are hidden or shown."""
         self._on_show.append(call)
 
     def select(self, frame: str) -> None:
@@ -165,23 +165,23 @@ class TreePanel:
             call()
 
     def search(self, search: str) -> None:
-        """Show the frames with these words in their names, and all frames above them.
+        """Show the frames whose names contain these words, and all frames above them.
 
-        Select the intended one, if any.
+        If the match is unambiguous, select the frame.
         """
         with self._lock:
             self._choices.search = search
             if self._search.value != search:
                 self._search.value = search
-            found = self.tree.matches(search)
-            frame = search if search in found else found.pop() if len(found) == 1 else None
+            matches = self.tree.matches(search)
+            frame = search if search in matches else matches.pop() if len(matches) == 1 else None
             self._refresh(scrolls=True)
         if frame is not None and frame != self._choices.selected:
             self.select(frame)
 
-    def show(self, frame: str, *, shown: bool) -> None:
+    def show(self, frame: str, *, is_visible: bool) -> None:
         """Show or hide a frame with all frames below it."""
-        self._show(self.tree.show(frame, self._choices.is_shown, shown=shown))
+        self._show(self.tree.show(frame, self._choices.is_shown, is_visible=is_visible))
 
     def _show(self, is_shown: dict[str, bool]) -> None:
         with self._lock:
@@ -191,14 +191,14 @@ class TreePanel:
             call()
 
     def mark(self, wrong: frozenset[str]) -> None:
-        """Mark frames red whose edges have errors."""
+        """Mark frames in red if their edges have errors."""
         with self._lock:
             if wrong != self._wrong:
                 self._wrong = wrong
                 self._refresh()
 
     def mark_moved(self, moved: frozenset[str]) -> None:
-        """Mark frames with a dot that were moved and are not saved."""
+        """Mark frames that were moved and not saved with a dot."""
         with self._lock:
             if moved != self._moved:
                 self._moved = moved
@@ -210,7 +210,7 @@ class TreePanel:
             self._refresh()
 
     def _click(self, does: str, frame: str, _when: float) -> None:
-        """Do what somebody clicked on in the page."""
+        """Handle a click in the page."""
         frames = self.tree.frames
         if does == "open all":
             self._open(dict.fromkeys(frames, True))
@@ -219,19 +219,22 @@ class TreePanel:
         elif does == "show all":
             self._show({})
         elif frame not in frames:
-            return  # of the robot that was shown before
+            return  # a frame of a robot that is no longer shown
         elif does == "select":
             self.select(frame)
         elif does == "open":
             self._open({frame: not self.tree.is_open(frame, self._choices.is_open)})
         elif does == "show":
-            self.show(frame, shown=frame in self.hidden)
+            self.show(frame, is_visible=frame in self.hidden)
 
     def _refresh(self, *, scrolls: bool = False) -> None:
         self._html.content = self.content(scrolls=scrolls)
 
     def content(self, *, scrolls: bool = False) -> str:
-        """Return the tree as HTML; it ``scrolls`` to the selected or found frame."""
+        """Return the tree as HTML.
+
+        If ``scrolls``, the page scrolls to the selected frame or the first match.
+        """
         choices, hidden = self._choices, self.hidden
         terms = re.compile(
             "|".join(map(re.escape, choices.search.split())) or r"(?!)", re.IGNORECASE
@@ -275,9 +278,9 @@ class TreePanel:
 
 
 def _mark(name: str, terms: re.Pattern[str]) -> str:
-    """Return a name as HTML with the words marked that are searched for."""
-    parts, at = [], 0
+    """Return a name as HTML in which the searched words are marked."""
+    parts, end = [], 0
     for match in terms.finditer(name):
-        parts += [escape(name[at : match.start()]), f"<mark>{escape(match[0])}</mark>"]
-        at = match.end()
-    return "".join([*parts, escape(name[at:])])
+        parts += [escape(name[end : match.start()]), f"<mark>{escape(match[0])}</mark>"]
+        end = match.end()
+    return "".join([*parts, escape(name[end:])])

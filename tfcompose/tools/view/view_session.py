@@ -1,4 +1,4 @@
-"""The robot that ``view`` shows: a file or built plan, as a session that recompiles."""
+"""Creation of the session for the robot file or the built plan that ``view`` shows."""
 
 from __future__ import annotations
 
@@ -7,11 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import disk_of, inputs_of, library, overlays_of
+from tfcompose.cli.compiling import (
+    disk_of,
+    inputs_of,
+    library,
+    load_robot,
+    overlays_of,
+    robot_overlay,
+)
 from tfcompose.cli.fixing import rewrite
 from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
 from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, reject
-from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.compile import Compiled, compile_source
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import RejectedError
@@ -29,10 +36,12 @@ if TYPE_CHECKING:
 
 
 def session_of(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
-    """Return the robot of a file, built plan or folder, with overlays, read by ``files``.
+    """Return a session for a robot file, a built plan or its folder.
+
+    ``files`` reads the files.
 
     Raises:
-        SystemExit: after saying why there is none to show.
+        SystemExit: after printing why there is no robot to show.
     """
     file = in_folder(file)
     try:
@@ -46,24 +55,27 @@ def session_of(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
 
 
 def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
-    texts = {name: files(name) for name in (file, *arguments.overlays)}
+    robot = robot_overlay(arguments, load_robot(file, files))
+    texts = {name: files(name) for name in (file, *arguments.overlays, robot) if name}
     presets, packages = library(files), replace(disk_of(file, arguments), read=files)
 
     def compile_model(now: Mapping[str, str]) -> Compiled:
         def read(name: str) -> str:
             return now[name] if name in now else files(name)
 
-        overlays = overlays_of(arguments, read)
-        return compile_robot(
-            now[file],
-            file,
-            presets.over(()),  # reads them anew
-            arguments.profiles,
-            overlays=overlays,
-            read=read,
-            disk=packages,
-            inputs=inputs_of(arguments),
-        )
+        try:
+            source = load_robot(file, read)
+            return compile_source(
+                source,
+                presets.over(()),  # reads presets again
+                arguments.profiles,
+                overlays_of(arguments, source, read),
+                read,
+                packages,
+                inputs_of(arguments),
+            )
+        except RejectedError as error:
+            return Compiled(None, error.findings)
 
     def write(name: str, old: str, new: str) -> None:
         rewrite(Path(name), old, new)
@@ -94,7 +106,7 @@ def plan_of_session(session: Session) -> Plan:
     """Return the plan of the session's robot.
 
     Raises:
-        SystemExit: after printing the errors for which it has no plan.
+        SystemExit: after printing the errors that prevent a plan.
     """
     file, text = next(iter(session.texts.items()))
     if is_plan(file):

@@ -1,7 +1,7 @@
-"""Browser windows on one robot, each with its own panel, selection, joints and unsaved moves.
+"""Browser windows of a view, each with its own panel, selection, joints and unsaved moves.
 
-All of them show the same files. A save in one appears in the others. If one window has moved a
-pose that another has saved, it reports that before it saves.
+All windows show the same files. When a window saves, all other windows show the change. If a
+window has moved a mount that another window has saved, it reports this before it saves.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from tfcompose.tools.view.panel import Window
 from tfcompose.tools.view.reload import ReloadedPanel, meshes_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import viser
 
     from tfcompose.compiler.compile import Compiled
@@ -25,24 +27,31 @@ if TYPE_CHECKING:
     from tfcompose.tools.view.reload import WatchedFiles
     from tfcompose.tools.view.session import Session
 
-#: What windows left that were closed is kept of so many.
+#: The maximum number of closed windows whose state is kept.
 _MOST_LEFT = 8
 
 
 @dataclass(eq=False)
 class SceneSource:
-    """A source of a scene: frames are where the robot file and the sliders put them.
+    """A source of poses. This base class uses the poses of the robot file and the sliders.
 
-    A running tree and a recording override this.
+    Subclasses use the poses of a running tree or a recording.
     """
 
     #: Whether mounts can be moved and saved.
     has_edit: bool = False
-    #: Whether a window has joint sliders.
+    #: Whether windows have joint sliders.
     has_joints: bool = True
 
-    def show_in(self, shown: ReloadedPanel) -> None:
+    def show_in(self, panel: ReloadedPanel) -> None:
         """Add the source's sections to a window, and show its frames there."""
+
+    def take_save(self, panel: ReloadedPanel) -> None:
+        """Compare with the files as a window has just saved them."""
+
+    def take_moves(self, session: Session) -> Sequence[str]:  # noqa: ARG002 (an override uses it)
+        """Follow the mounts that were moved in a window's session; return lines about that."""
+        return ()
 
     def run(self, windows: Windows, changed: threading.Event) -> int:
         """Keep the windows up to date until the view ends; return the exit code."""
@@ -53,16 +62,13 @@ class SceneSource:
 
 
 class Windows:
-    """Makes a panel for each window that connects to a server, and reloads all of them.
+    """Makes a panel for each window that connects to a server, and reloads all panels.
 
-    A new window continues the state of a closed one, because browsers reconnect when a page is
-    reloaded or a computer sleeps.
+    A new window continues with the state of a closed window, because browsers reconnect when a
+    page is reloaded or when a computer wakes up.
 
-    Args:
-        server: where windows connect.
-        session: what is shown; nothing is moved in it.
-        files: what the session was read with.
-        source: where frames are, and which sections a window has.
+    ``session`` has no moved frames. ``files`` read its files. ``source`` sets the poses, and the
+    sections of a window.
     """
 
     def __init__(
@@ -93,11 +99,11 @@ class Windows:
 
     def end(self) -> None:
         """Stop all panels from moving anything."""
-        for shown in self.panels:
-            shown.panel.end()
+        for panel in self.panels:
+            panel.panel.end()
 
     def reload(self) -> bool:
-        """Read the files again if they have changed, and show them in all windows.
+        """If the files have changed, read them and show them in all windows.
 
         Return whether there is a new robot.
         """
@@ -105,9 +111,9 @@ class Windows:
             if not self.files.differ():
                 return False
             texts, state = self.session.read_again(self.files)
-            for shown in self._open.values():
-                if shown.accept(texts, state):
-                    self._source.show_in(shown)
+            for panel in self._open.values():
+                if panel.accept(texts, state):
+                    self._source.show_in(panel)
             self._findings = state.findings
             if not self.session.accepts(state):
                 return False
@@ -123,44 +129,50 @@ class Windows:
         """Make a panel for the window with this number, and register it."""
         with self._lock:
             session, choices = self._left.pop() if self._left else (self.session.fork(), None)
-            shown = ReloadedPanel(
+            panel = ReloadedPanel(
                 place,
                 session,
                 self.files,
                 edit=self._source.has_edit,
                 joints=self._source.has_joints,
                 choices=choices,
-                window=Window(self._server, self._lock, lambda: self._share(number)),
+                window=Window(
+                    self._server,
+                    self._lock,
+                    share=lambda: self._share(number),
+                    take_moves=lambda: self._source.take_moves(session),
+                ),
             )
-            self._open[number] = shown
+            self._open[number] = panel
             if self._findings:
-                shown.show(self._findings)
-            self._source.show_in(shown)
+                panel.show(self._findings)
+            self._source.show_in(panel)
 
     def _remove(self, client: viser.ClientHandle) -> None:
         with self._lock:
-            shown = self._open.pop(client.client_id, None)
-            if shown is not None:
-                shown.panel.end()
-                self._left = [*self._left, (shown.session, shown.panel.choices)][-_MOST_LEFT:]
+            panel = self._open.pop(client.client_id, None)
+            if panel is not None:
+                panel.panel.end()
+                self._left = [*self._left, (panel.session, panel.panel.choices)][-_MOST_LEFT:]
 
     def _share(self, number: int) -> None:
-        """Show in all other windows what one has saved, and say so."""
+        """Show a save of a window in all other windows, with a notice."""
         saved = self._open[number].session
         texts, state = dict(saved.texts), saved.state
-        for other, shown in self._open.items():
-            if other == number:
+        for panel_number, panel in self._open.items():
+            if panel_number == number:
+                self._source.take_save(panel)
                 continue
-            conflicts = _conflicts(shown.session, state)
-            if shown.accept(texts, state):
-                self._source.show_in(shown)
-            shown.panel.window.conflicts |= conflicts
-            shown.panel.say(_word(list(shown.session.moved), conflicts))
+            conflicts = _conflicts(panel.session, state)
+            if panel.accept(texts, state):
+                self._source.show_in(panel)
+            panel.panel.window.conflicts |= conflicts
+            panel.panel.say(_word(list(panel.session.moved), conflicts))
         self._replace(texts, state)
 
 
 def _conflicts(session: Session, state: Compiled) -> set[str]:
-    """Return the frames that were moved in a session and have another pose in the files now."""
+    """Return the frames that a session has moved and whose poses in the files have changed."""
     before = session.state.robot.edges if session.state.robot else ()
     poses = {edge.child: edge.pose for edge in before}
     after = state.robot.edges if state.robot else ()
@@ -172,7 +184,7 @@ def _conflicts(session: Session, state: Compiled) -> set[str]:
 
 
 def _word(moved: list[str], conflicts: set[str]) -> str:
-    """Return what to say of a save in another window."""
+    """Return the notice about a save in another window."""
     lines = ["another window saved its moves, which are shown here now"]
     if moved:
         lines.append(f"not saved yet here: {list_names(moved)}")

@@ -19,14 +19,14 @@ def main() -> None:
     while True:
         buffer.can_transform("base_link", "camera_link", Time(), Duration(seconds=1.0))
         try:
-            found = buffer.lookup_transform("base_link", "camera_link", Time())
+            stamped = buffer.lookup_transform("base_link", "camera_link", Time())
         except (
             tf2_ros.LookupException,
             tf2_ros.ConnectivityException,
             tf2_ros.ExtrapolationException,
         ):
             continue
-        to, rotation = found.transform.translation, found.transform.rotation
+        to, rotation = stamped.transform.translation, stamped.transform.rotation
         print(
             f"at ({to.x:.3f}, {to.y:.3f}, {to.z:.3f}) turned ({rotation.y:.3f}, {rotation.w:.3f})",
             flush=True,

@@ -28,10 +28,10 @@ class LaserInBase(Node):
         except TransformException as error:
             print(f"not yet: {error}", flush=True)
             return
-        at = t.transform.translation
+        position = t.transform.translation
         print(
-            f"laser_link in base_link: ({at.x:.3f}, {at.y:.3f}, {at.z:.3f}) {t.header.frame_id}"
-            f" {t.child_frame_id}"
+            f"laser_link in base_link: ({position.x:.3f}, {position.y:.3f}, {position.z:.3f})"
+            f" {t.header.frame_id} {t.child_frame_id}"
         )
         if not self.tf_buffer.can_transform(
             "odom", "laser_link", self.get_clock().now(), timeout=Duration(seconds=5.0)

@@ -1,4 +1,4 @@
-"""Parts of a URDF that a robot file cannot hold: omitted or changed, with a note."""
+"""Notes about parts of a URDF that the import omits or changes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Entry = tuple[str, str]
     Notes = dict[Entry, list[str]]
 
-#: Known attributes that no robot holds.
+#: Known attributes that a robot file cannot express.
 _NOT_HELD = {
     "link": ("type",),
     "visual": ("name",),
@@ -33,18 +33,18 @@ _NOT_HELD = {
     "limit": ("acceleration", "jerk", "deceleration"),
     "calibration": ("reference_position",),
 }
-#: Elements that have no effect in a fixed joint.
+#: Elements without an effect in a fixed joint.
 _OF_MOTION = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
-#: Blocks that are ignored if they refer to nothing; ros2_control does not start with an unknown
-#: joint.
+#: Blocks that programs ignore if they refer to a missing link or joint. ros2_control is not in
+#: this list, because it does not start with an unknown joint.
 _UNUSED = ("<gazebo", "<transmission")
 _MATERIAL = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def omitted_notes(document: Document) -> Notes:
-    """Return what reading or import omits, by link and joint.
+    """Return notes about omitted parts of the source, by link and joint.
 
-    Notes about the robot itself have an empty name.
+    The key of notes about the whole robot is an empty name.
     """
     notes: Notes = {}
     entries: list[tuple[Span, Entry]] = []
@@ -63,7 +63,7 @@ def omitted_notes(document: Document) -> Notes:
             )
     for (
         finding
-    ) in document.converted.of_elements:  # what is about blocks and files leaves none out
+    ) in document.converted.of_elements:  # findings about blocks and files omit no link or joint
         if finding.span:
             notes.setdefault(_entry_at(finding.span, entries), []).append(
                 f"{finding.code} in the source: {finding.message}"
@@ -80,7 +80,9 @@ def _has_no_ends(element: Element) -> bool:
 
 
 def _entry_at(span: Span, entries: list[tuple[Span, Entry]]) -> Entry:
-    before = [entry for at, entry in entries if (at.line, at.column) <= (span.line, span.column)]
+    before = [
+        entry for path, entry in entries if (path.line, path.column) <= (span.line, span.column)
+    ]
     return before[-1] if before else ("", "")
 
 
@@ -88,18 +90,18 @@ def _in_robot(root: Element, robot: Robot) -> Iterator[str]:
     for name in root.attributes:
         if name != "name" and not name.startswith("xmlns"):
             yield f'{name}="{root.attributes[name]}"'
-    known = {material.name for material in materials(robot.links)}
+    names = {material.name for material in materials(robot.links)}
     unused = [
         name
         for element in root.all("material")
-        if (name := element.attributes.get("name", "")) not in known
+        if (name := element.attributes.get("name", "")) not in names
     ]
     if unused:
         yield f"the unused material{'s' if unused[1:] else ''} {', '.join(unused)}"
 
 
 def _in_element(element: Element, colours: frozenset[str]) -> Iterator[str]:
-    """Yield notes about contents of a link or joint that a robot file cannot hold."""
+    """Yield notes about parts of a link or joint that a robot file cannot express."""
     if element.tag == "joint" and element.attributes.get("type") == "fixed":
         tags = [child.tag for child in element.children if child.tag in _OF_MOTION]
         yield from (f"the {tag} of a fixed joint" for tag in tags)
@@ -137,7 +139,7 @@ def _elements_in(element: Element) -> Iterator[Element]:
 
 
 def angles(root: Element) -> dict[Quaternion, Vector]:
-    """Return each origin's roll, pitch and yaw (rad) in the source, by rotation."""
+    """Return the roll, pitch and yaw (rad) of each ``origin`` in the source, by rotation."""
     rpy: dict[Quaternion, Vector] = {}
     for top in root.children:
         for element in _elements_in(top) if top.tag in {"link", "joint"} else ():
@@ -154,7 +156,7 @@ def angles(root: Element) -> dict[Quaternion, Vector]:
 
 
 def without_unused_blocks(robot: Robot) -> tuple[Robot, list[str]]:
-    """Return the robot without blocks about missing links and joints, with notes."""
+    """Return the robot without blocks about missing links and joints, and notes about them."""
     joints = {edge.joint_name: None for edge in robot.edges}
     blocks, notes = [], []
     for block in robot.blocks:
@@ -220,7 +222,7 @@ def _material_name(name: str, used_names: set[str]) -> str:
 
 
 def _clamp_colour(material: Material) -> tuple[float, float, float, float] | None:
-    """Return the colour with parts from 0 to 1."""
+    """Return the colour with each component limited to 0 to 1; None if there is no colour."""
     if material.rgba is None:
         return None
     red, green, blue, opacity = (min(max(part, 0.0), 1.0) for part in material.rgba)

@@ -1,7 +1,8 @@
-"""Programs that a script or a launch file starts, as entries of a robot file.
+"""Entries of a robot file for the programs that a script or a launch file starts.
 
-A ``static_transform_publisher`` is a frame, a ``robot_state_publisher`` the part or the links of
-its description, a ``joint_state_publisher`` a stand-in for joint states; all others are processes.
+A ``static_transform_publisher`` becomes a frame. A ``robot_state_publisher`` becomes a part or
+links, made from its description. A ``joint_state_publisher`` becomes a process that simulates
+joint states. All other programs become processes.
 """
 
 from __future__ import annotations
@@ -42,19 +43,19 @@ _FROM_TOPIC = (
     "nothing, if the node takes the description from the topic robot_description, where tfcompose"
     " publishes it"
 )
-#: A component's package and class, which YAML needs no quotes for.
+#: A component's package and class that need no quotes in YAML.
 _PLUGIN = re.compile(r"[A-Za-z]\w*/[A-Za-z_]\w*(::\w+)*", re.ASCII)
-#: Between the words of a class's name.
+#: The positions between the words of a class name.
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-#: Default rate of joint_state_publisher.
+#: Default rate of joint_state_publisher, in Hz.
 _JOINTS_HZ = 10.0
 
 
 def add_program(draft: ImportDraft, program: Program, target: Target) -> str | None:
     """Add a program to the draft; return the name of its process, None if it is not a process.
 
-    A robot_state_publisher is not added here: ``descriptions`` makes links or a part of its
-    description.
+    This function does not add a robot_state_publisher: ``urdf.add_descriptions`` makes links or a
+    part from its description.
     """
     program = with_ros_arguments(program)
     if program.executable == PROGRAM:
@@ -96,7 +97,7 @@ def _add_transform(draft: ImportDraft, program: Program) -> None:
 
 
 def _add_external(draft: ImportDraft, program: Program) -> str:
-    """Add the process of a publisher that goes on to be started elsewhere; return its name."""
+    """Add an external process for a publisher that the launch file keeps; return its name."""
     namespace = (program.namespace or "").strip("/")
     if program.name is None:
         draft.todo(
@@ -111,9 +112,9 @@ def _add_external(draft: ImportDraft, program: Program) -> str:
 
 
 def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
-    """Add a stand-in for joint states.
+    """Add a process that simulates joint states; return its name.
 
-    All joints at 0, as joint_state_publisher has them unless it is told.
+    All joints are at 0, which is the default of joint_state_publisher.
     """
     params: dict[str, Any] = {}
     for param_set in program.params:
@@ -169,7 +170,7 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
         if program.package and not program.name and not program.plugin
         else None
     )
-    wanted = (
+    preferred = (
         (program.name and program.label)
         or program.name
         or usual
@@ -177,7 +178,7 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
         or _plain(program)
         or "process"
     )
-    name = draft.free_name(wanted)
+    name = draft.free_name(preferred)
     keeps_name = not source_name and _keeps_its_name(program)
     params = params_of(program, target, program.name or name, draft, keeps_name=keeps_name)
     program = replace(program, argv=(*program.argv, *params.argv))
@@ -185,8 +186,8 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     keys = _way(program)
     notes = [where(span)]
     if keeps_name:
-        own = {"params": params.own} if params.own else {}
-        keys["nodes"] = {program.name or usual or name: own}
+        settings = {"params": params.of_node} if params.of_node else {}
+        keys["nodes"] = {program.name or usual or name: settings}
         if not program.name and not usual:
             notes.append(f"the source does not name the node: {name} is a guess")
     elif program.name and program.name != name:
@@ -211,9 +212,9 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
 
 
 def _is_literal(text: str, span: Span | None, draft: ImportDraft) -> bool:
-    """Whether the source has the word's addresses of packages itself, as the program reads them.
+    """Whether all ``package://`` addresses in the text are also in the source file.
 
-    What the source looks up in a package that is not found has such an address too.
+    If they are not, the import made them from paths in a package that it did not find.
     """
     try:
         source = draft.reach.read(span.file, MOST_BYTES) if span else b""
@@ -223,9 +224,9 @@ def _is_literal(text: str, span: Span | None, draft: ImportDraft) -> bool:
 
 
 def _keeps_its_name(program: Program) -> bool:
-    """Whether a program without a name is nodes of their own names.
+    """Whether the nodes of a program without a name keep the names in their code.
 
-    A name on its command line would rename them all.
+    A name on the command line would rename all nodes of the program.
     """
     return program.package is not None and not program.plugin and not program.loads
 
@@ -233,13 +234,13 @@ def _keeps_its_name(program: Program) -> bool:
 def remappings(rules: Sequence[tuple[str, str]]) -> dict[str, str]:
     """Return remappings in the form of a robot file.
 
-    ROS uses the first of several rules for one name.
+    If several rules have the same name, ROS uses the first rule.
     """
     return dict(reversed(list(dict(reversed(rules)).items())))
 
 
 def _way(program: Program) -> dict[str, Any]:
-    """Return the keys that say how the program runs."""
+    """Return the keys with which the robot file starts the program."""
     if program.plugin:
         name = f"{program.package}/{program.plugin}"
         return {"component": Bare(name) if _PLUGIN.fullmatch(name) else name, "container": ""}
@@ -249,9 +250,10 @@ def _way(program: Program) -> dict[str, Any]:
 
 
 def _container_keys(program: Program) -> dict[str, Any]:
-    """Return what a container is.
+    """Return the keys of a container.
 
-    By its isolation and executor if it is a stock one, else by its program.
+    A stock container has ``isolation`` and ``executor``. Any other container has ``package`` and
+    ``executable``.
     """
     argv = list(program.argv)
     is_stock = program.package == CONTAINERS
@@ -268,7 +270,7 @@ def _container_keys(program: Program) -> dict[str, Any]:
 
 
 def _usual_name(package: str) -> str | None:
-    """Return how the node of a package calls itself, where that is known."""
+    """Return the default node name of a package's program, if it is known."""
     names = {
         preset.node
         for preset_name in node_preset_names()
@@ -282,7 +284,7 @@ def _texts(argv: Sequence[Any]) -> list[str]:
 
 
 def _run(program: Program) -> Any:
-    """Return what ``run`` says of the program."""
+    """Return the value of ``run`` for the program."""
     if program.shell:
         return concatenate(program.argv, " ")
     if program.package is not None:
@@ -304,7 +306,7 @@ def _run(program: Program) -> Any:
 
 
 def _plain(program: Program) -> str:
-    """Return the name of what is started, without its folder and ending."""
+    """Return the file name of the started program, without its folder and ending."""
     match program.argv:
         case ("ros2", "launch", _, file, *_) if program.package is None:
             stem = file

@@ -1,4 +1,4 @@
-"""Keys of other formats, and the key to write instead.
+"""Keys of other formats, with the keys to write instead.
 
 The formats are URDF, launch files, ROS messages and compose files.
 """
@@ -22,7 +22,7 @@ _OPTION = "it is an option of the sensor: options: {WORD: …}; tfcompose preset
 _ROBOTS = "several robots are parts: {r1: {spec: rover.yaml, namespace: r1, prefix: r1_}}"
 _MASS = "it belongs under inertial: {mass: 2 kg}"
 
-#: By the word: the key that has its meaning, where that is known, and what to write.
+#: By word: the key with this meaning, and advice.
 _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
     habit_word: meanings
     for habit_words, meanings in (
@@ -241,7 +241,7 @@ _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
     )
     for habit_word in habit_words.split()
 }
-#: Keys of a process that another format calls so, by the word.
+#: The same for keys of a process, by the word in the other format.
 _OF_PROCESSES: dict[str, tuple[tuple[str, str], ...]] = {
     habit_word: ((row.name, advice),)
     for row in PROCESS_KEYS
@@ -254,7 +254,7 @@ _HABITS = {
 }
 
 
-#: Values that have another name here.
+#: Values of other formats, with their names in this language.
 _VALUES = {
     habit_word: value
     for habit_words, value in (
@@ -275,16 +275,16 @@ _VALUES = {
 }
 
 
-def habit(name: str, known: Collection[str], value: object = None) -> str:
-    """Return what to write instead of another format's key, given the ``known`` keys.
+def habit(name: str, keys: Collection[str], value: object = None) -> str:
+    """Return what to write instead of another format's key, given the valid ``keys``.
 
-    ``value`` is what stands there.
+    ``value`` is the value of the key.
     """
-    advice = next((advice for key, advice in _HABITS.get(name, ()) if key in known), "")
+    advice = next((advice for key, advice in _HABITS.get(name, ()) if key in keys), "")
     return advice.replace("WORD", name).replace("VALUE", value if isinstance(value, str) else "…")
 
 
 def usual_value(text: str, allowed: Collection[str]) -> str:
-    """Return the allowed word that means the same, or the word itself."""
+    """Return the allowed word with the same meaning, otherwise the word itself."""
     value = _VALUES.get(text.lower(), text)
     return value if value in allowed else text

@@ -1,4 +1,4 @@
-"""Parts from a URDF or xacro file, or from one macro of such a file."""
+"""Parts from a URDF or xacro file, or from a macro in such a file."""
 
 from __future__ import annotations
 
@@ -38,33 +38,32 @@ class Foreign:
     """The robot of a URDF or xacro file."""
 
     robot: Robot
-    #: The files that describe it.
+    #: The files that describe the robot.
     files: tuple[str, ...]
-    #: Errors, and files that it names but that are missing. Other warnings are for the file's
-    #: author.
+    #: Errors and missing files. Other warnings are only of interest to the file's author.
     findings: tuple[Finding, ...]
-    #: Parent frames of its joints that the file does not define. They are the holder's if a macro
-    #: makes the part.
+    #: Parent frames that the file does not define. If a macro makes the part, the including robot
+    #: defines them.
     implied: frozenset[str] = frozenset()
 
 
-def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> Foreign:
+def resolve_urdf_part(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> Foreign:
     """Return the robot of a part that is a URDF or xacro file.
 
     Raises:
-        RejectedError: if the file is missing or invalid, or xacro refuses it.
+        RejectedError: if the file is missing or invalid, or xacro fails.
     """
     spec = part.declared
     key = "urdf" if spec.urdf is not None else "xacro"
     span = part.spec.span_of((*part.path, key))
     file = packages.path_of(spec.urdf or spec.xacro or "", span)
     files: tuple[str, ...] = (file,)
-    bolted = _attachment_arguments(part, read(file)) if spec.macro is not None else {}
+    attachment = _attachment_arguments(part, read(file)) if spec.macro is not None else {}
     if spec.urdf is not None:
         text = read(file)
         root = read_xml(text, file)
     else:
-        expansion = _expand_part(part, file, span, packages, bolted)
+        expansion = _expand_part(part, file, span, packages, attachment)
         text, files = expansion.text, tuple(dict.fromkeys((file, *expansion.files)))
         root = read_expansion(expansion, file, read)
     converted = robot_of(root, file, packages.asset, files)
@@ -78,8 +77,8 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         )
         raise RejectedError([finding("TF206", f"{file} has no links", span, help=advice)])
     robot = with_hardware(robot)
-    if bolted:
-        robot = _without_edge(robot, bolted, part)
+    if attachment:
+        robot = _without_edge(robot, attachment, part)
     parents = {edge.parent for edge in robot.edges}
     implied = (
         frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
@@ -93,12 +92,12 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     findings += converted.of_files
     robot = replace(
         robot, source_numbers=(), source_data={"urdf": digest}
-    )  # its numbers are judged where it is linted
-    own = _with_base(replace(robot, ros=part.settings, processes=_own(part)))
-    if part.declared.is_alone and part.spec.ros.state_publisher == "stock" and own.base:
-        findings += stock_faults(own)
-        own = with_stock(own)
-    return Foreign(own, files, tuple(findings), implied)
+    )  # ``lint`` of the URDF checks its numbers
+    part_robot = _with_base(replace(robot, ros=part.settings, processes=_publishers_of(part)))
+    if part.declared.is_alone and part.spec.ros.state_publisher == "stock" and part_robot.base:
+        findings += stock_faults(part_robot)
+        part_robot = with_stock(part_robot)
+    return Foreign(part_robot, files, tuple(findings), implied)
 
 
 def _with_base(robot: Robot) -> Robot:
@@ -107,7 +106,7 @@ def _with_base(robot: Robot) -> Robot:
 
 
 def _expand_part(
-    part: PartEntry, file: str, span: Span, packages: Packages, bolted: Mapping[str, str]
+    part: PartEntry, file: str, span: Span, packages: Packages, attachment: Mapping[str, str]
 ) -> Expansion:
     disk, spec = packages.disk, part.declared
     if disk is None:
@@ -116,11 +115,14 @@ def _expand_part(
         name: _with_files(value, (*part.path, "args", name), part, disk)
         for name, value in spec.args.items()
     }
-    return disk.expand(file, packages, args, _use(part, file, packages, disk, bolted))
+    return disk.expand(file, packages, args, _use(part, file, packages, disk, attachment))
 
 
 def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
-    """Return a value with each ``${file(PATH)}`` made absolute from the robot file's folder."""
+    """Return the value with each ``${file(PATH)}`` replaced by an absolute path.
+
+    A relative PATH starts at the folder of the robot file.
+    """
     span = part.spec.span_of(path)
 
     def absolute(call: re.Match[str]) -> str:
@@ -136,39 +138,38 @@ def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
     return OF_FILES.sub(absolute, value) if isinstance(value, str) else value
 
 
-#: Macros' names for the link that they attach to, and for the block with their pose.
+#: Usual parameters of macros for the parent link, and for the block with the pose.
 _PARENTS, _ORIGIN = ("parent_link", "parent", "parent_frame", "connected_to"), "origin"
 
 
-#: A macro's parameter as it is declared, and its default.
+#: The declaration of a macro's parameter, and its default.
 _PARAMETER = re.compile(r"(\*{0,2}[A-Za-z_]\w*)(?:\s*:?=\s*('[^']*'|\S+))?")
 
 
 def _attachment_arguments(part: PartEntry, text: str) -> dict[str, str]:
-    """Return the arguments of a macro that takes a parent, and perhaps an origin.
+    """Return the arguments for a macro that takes a parent and perhaps an origin.
 
-    The part's key ``parent`` gives it.
-
-    The origin is none: the part's own keys say where it is.
+    The parent is the part's key ``parent``. The origin is the identity, because the part's own
+    keys determine its pose.
     """
     spec = part.declared
     defaults = dict(_PARAMETER.findall(macros_in(text).get(spec.macro or "", "")))
-    wanted = [name for name in _PARENTS if name in defaults and defaults[name] != "''"]
-    if spec.parent is None or not wanted or spec.params.keys() & {*_PARENTS, _ORIGIN}:
+    parents = [name for name in _PARENTS if name in defaults and defaults[name] != "''"]
+    if spec.parent is None or not parents or spec.params.keys() & {*_PARENTS, _ORIGIN}:
         return {}
-    bolted = {wanted[0]: spec.parent[0]}
-    return bolted | ({_ORIGIN: "<origin/>"} if f"*{_ORIGIN}" in defaults else {})
+    attachment = {parents[0]: spec.parent[0]}
+    return attachment | ({_ORIGIN: "<origin/>"} if f"*{_ORIGIN}" in defaults else {})
 
 
-def _without_edge(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
-    """Return what a macro made without the joint by which it hangs on its parent.
+def _without_edge(robot: Robot, attachment: Mapping[str, str], part: PartEntry) -> Robot:
+    """Return the macro's robot without the joint that attaches it to the parent.
 
-    The part's mount edge is that.
+    The part's mount edge replaces this joint.
 
     Raises:
-        RejectedError: if there are several such joints, or one that moves or is somewhere else.
+        RejectedError: if there are several such joints, or the joint moves or has a pose.
     """
-    parent = next(iter(bolted.values()))
+    parent = next(iter(attachment.values()))
     joints = [edge for edge in robot.edges if edge.parent == parent and parent not in robot.frames]
     if not joints:
         return robot
@@ -181,7 +182,7 @@ def _without_edge(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> R
         )
         advice = (
             "leave parent out, and give the macro its parent and pose: params:"
-            f" {{{next(iter(bolted))}: {parent}, …}}"
+            f" {{{next(iter(attachment))}: {parent}, …}}"
         )
         message = f"the macro {part.declared.macro} is attached to {parent} by {what}"
         raise RejectedError(
@@ -191,13 +192,13 @@ def _without_edge(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> R
         part.declared = part.declared.model_copy(
             update={"joint": f"{part.prefix}{edge.joint_name}"}
         )
-    return replace(robot, edges=tuple(other for other in robot.edges if other is not edge))
+    return replace(robot, edges=tuple(kept for kept in robot.edges if kept is not edge))
 
 
 def _use(
-    part: PartEntry, file: str, packages: Packages, disk: Disk, bolted: Mapping[str, str]
+    part: PartEntry, file: str, packages: Packages, disk: Disk, attachment: Mapping[str, str]
 ) -> Use:
-    """Return how the part uses the file: as a whole, or a call of its macro."""
+    """Return how the part uses the file: the complete file, or a call of its macro."""
     spec, path = part.declared, part.path
     if spec.macro is None:
         return Use(part.spec.span_of((*path, "xacro")))
@@ -206,8 +207,10 @@ def _use(
         *(packages.path_of(file, span) for file, span in zip(spec.include, places, strict=True)),
         file,
     )
-    parameters: dict[str, str] = {name: value for name, value in bolted.items() if name != _ORIGIN}
-    blocks = [bolted[_ORIGIN]] if _ORIGIN in bolted else []
+    parameters: dict[str, str] = {
+        name: value for name, value in attachment.items() if name != _ORIGIN
+    }
+    blocks = [attachment[_ORIGIN]] if _ORIGIN in attachment else []
     for name, value in spec.params.items():
         if _is_markup(value):
             _refuse_broken(name, value, part.spec.span_of((*path, "params", name)))
@@ -243,7 +246,7 @@ def _refuse_broken(name: str, text: str, span: Span) -> None:
 
 
 def _block(value: Any) -> str | None:
-    """Return the element that a parameter is, or None for one that is a word."""
+    """Return the XML element that a parameter stands for, None for a plain value."""
     if isinstance(value, Origin):
         pose = pose_of(value)
         xyz, rpy = (
@@ -257,7 +260,7 @@ def _word(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _own(part: PartEntry) -> tuple[Process, ...]:
+def _publishers_of(part: PartEntry) -> tuple[Process, ...]:
     """Return the publishers of a part that is a separate robot."""
     settings: RosSettings = part.settings
     remap = topics_below(settings.namespace, part.isolate)

@@ -1,0 +1,150 @@
+"""Adjusted poses of fixed edges of a running robot.
+
+An adjustment is a copy of the plan that the robot runs, and of its descriptions, with other poses.
+The launcher follows it without a restart: the edge's publisher sends the new pose, and late
+listeners and restarted processes get it, too. The robot file stays as it is.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.plans import PLAN, digest_of, files_of, write_copy
+from tfcompose.cli.runs import plan_file
+from tfcompose.compiler.emit.argv import edit_description
+from tfcompose.compiler.urdf.write import with_pose
+from tfcompose.foundation.numbers import clean
+from tfcompose.launcher.control import RequestRefusedError, ask
+from tfcompose.model.messages import AdjustRequest, PlanChange
+from tfcompose.model.plan.file import read_plan
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.launcher.runtime_dir import RuntimeDir
+    from tfcompose.model.plan import Plan, PlanEdge, PlanProcess
+
+#: The edges to replace, by child.
+Edges = dict[str, "PlanEdge"]
+#: Number of earlier poses that an edge keeps; the built one is always among them.
+MOST_EARLIER = 100
+#: Attempts while others adjust the same robot.
+_ATTEMPTS = 5
+#: Copies of earlier adjustments are kept this long, for processes that are being started, in
+#: seconds.
+_KEPT_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class RunningPlan:
+    """The plan that a robot runs, and its file in the runtime directory."""
+
+    plan: Plan
+    file: Path
+
+
+def running_plan(runtime_dir: RuntimeDir) -> RunningPlan:
+    """Return the plan that the robot runs.
+
+    Raises:
+        RejectedError, OSError, ValueError: if it cannot be read.
+    """
+    file = plan_file(runtime_dir)
+    return RunningPlan(read_plan(file.read_text(encoding="utf-8"), str(file)), file)
+
+
+def moved(edge: PlanEdge, pose: Pose) -> PlanEdge:
+    """Return the edge at another pose; it remembers the current one."""
+    pose = clean(pose)
+    if pose == edge.pose:
+        return edge
+    earlier = (*edge.earlier, edge.pose)
+    return replace(edge, pose=pose, earlier=(earlier[0], *earlier[1:][1 - MOST_EARLIER :]))
+
+
+def undone(edge: PlanEdge) -> PlanEdge:
+    """Return the edge before its last adjustment."""
+    return replace(edge, pose=edge.earlier[-1], earlier=edge.earlier[:-1])
+
+
+def reset(edge: PlanEdge) -> PlanEdge:
+    """Return the edge as it was built."""
+    return replace(edge, pose=edge.earlier[0], earlier=())
+
+
+def adjust(runtime_dir: RuntimeDir, choose: Callable[[Plan], Edges]) -> Edges:
+    """Have a running robot follow other poses, and return the edges with them.
+
+    ``choose`` returns the changed edges of a plan by child. It is called again if another command
+    changed the plan meanwhile, so that no adjustment is lost.
+
+    Raises:
+        RequestRefusedError: with the launcher's reason.
+        OSError: if the robot does not answer, or a file cannot be read or written.
+        RejectedError, ValueError: if its plan cannot be read.
+    """
+    for attempt in range(_ATTEMPTS):
+        running = running_plan(runtime_dir)
+        edges = choose(running.plan)
+        plan = replace(
+            running.plan,
+            edges=tuple(edges.get(edge.child, edge) for edge in running.plan.edges),
+        )
+        if plan == running.plan:
+            return edges
+        files = _files_of(plan, running.file.parent, edges)
+        folder = runtime_dir.plan_folder(digest_of(files))
+        write_copy(files, folder)
+        try:
+            ask(runtime_dir, AdjustRequest(str(folder / PLAN), str(running.file)), PlanChange)
+        except RequestRefusedError:
+            if attempt == _ATTEMPTS - 1 or plan_file(runtime_dir) == running.file:
+                raise
+            continue
+        _remove_earlier(runtime_dir, folder)
+        return edges
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _files_of(plan: Plan, folder: Path, edges: Edges) -> Mapping[str, bytes]:
+    """Return the plan's files; descriptions have the edges' poses."""
+    files = files_of(plan, folder)
+
+    def edit(name: str, change: Callable[[str], str]) -> None:
+        if name in files:
+            files[name] = change(files[name].decode("utf-8")).encode()
+
+    for edge in edges.values():
+        owner = plan.process(edge.owner)
+        part = _part(owner)
+        place = partial(with_pose, parent=edge.parent, child=edge.child, pose=edge.pose)
+        for description in {plan.description, owner.description or plan.description}:
+            edit(description, place)
+        for process in plan.processes:
+            if process.is_state_publisher and _part(process) in {"", part}:
+                edit(process.params_file or "", partial(edit_description, edit=place))
+    return files
+
+
+def _part(process: PlanProcess) -> str:
+    """Return the part that a process belongs to; empty: the robot."""
+    return process.name.rpartition("/")[0]
+
+
+def _remove_earlier(runtime_dir: RuntimeDir, current: Path) -> None:
+    """Remove copies of earlier adjustments."""
+    before = time.time() - _KEPT_S
+    for folder in runtime_dir.plan_folders():
+        try:
+            text = (folder / PLAN).read_text(encoding="utf-8")
+            is_earlier = '"earlier": ' in text and folder.stat().st_mtime < before
+        except OSError:
+            continue
+        if folder != current and is_earlier:
+            shutil.rmtree(folder, ignore_errors=True)

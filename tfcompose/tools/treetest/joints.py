@@ -1,0 +1,153 @@
+"""Expectations of a joint: its declaration in the robot file, and the motion of its edge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Note, finding
+from tfcompose.foundation.geometry import (
+    Offset,
+    Pose,
+    angle_between,
+    norm,
+    normalise,
+    offset_of,
+    rotate,
+)
+from tfcompose.foundation.numbers import numbers
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.plan import JointType, PlanEdge
+    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.replay import Arrival
+    from tfcompose.tools.treetest.spec import JointExpectation
+
+#: Joints with one axis. Of planar and floating ones the motion is not compared.
+_TURNING = frozenset({"revolute", "continuous"})
+_SLIDING = "prismatic"
+
+
+@dataclass(slots=True)
+class JointProbe:
+    """Finds the first pose of an edge that its joint cannot reach at any position."""
+
+    parent: str
+    child: str
+    type: JointType
+    #: The pose of the child at joint position 0.
+    origin: Pose
+    #: A unit vector in the child frame.
+    axis: Vector
+    within: Offset
+    #: The first pose off the joint's motion; None: every pose is on it.
+    pose: Pose | None = None
+    offset: Offset = field(default_factory=lambda: Offset(0.0, 0.0))
+    elapsed_s: float = 0.0
+
+    def take(self, arrival: Arrival) -> None:
+        """Compare the edge's transforms in a message with the joint's motion."""
+        for row in arrival.rows:
+            names = row[0].removeprefix("/"), row[1].removeprefix("/")
+            if self.pose is not None or names != (self.parent, self.child):
+                continue
+            pose = Pose(row[4:7], row[7:11])
+            if not norm(pose.quat_xyzw):
+                continue
+            offset = self._offset(Pose(pose.xyz, normalise(pose.quat_xyzw)))
+            if offset.beyond(self.within):
+                self.pose, self.offset, self.elapsed_s = pose, offset, arrival.elapsed_s
+
+    def _offset(self, pose: Pose) -> Offset:
+        """Return how far a pose is from the nearest one that the joint can reach."""
+        motion = self.origin.inverse() @ pose
+        if self.type == _SLIDING:
+            along = sum(a * b for a, b in zip(motion.xyz, self.axis, strict=True))
+            aside = tuple(a - along * b for a, b in zip(motion.xyz, self.axis, strict=True))
+            return Offset(norm(aside), angle_between((0.0, 0.0, 0.0, 1.0), motion.quat_xyzw))
+        # The rotation moves the axis itself by the least angle that no turn about it explains.
+        moved = rotate(motion.quat_xyzw, self.axis)
+        tilt = norm(tuple(a - b for a, b in zip(moved, self.axis, strict=True)))
+        return Offset(norm(motion.xyz), tilt)
+
+
+def expected_motion(expected: JointExpectation, planned: PlanEdge) -> JointProbe | None:
+    """Return the probe for a joint's motion; what is not expected is as the robot file says.
+
+    None if the edge has no joint with one axis.
+    """
+    if planned.joint is None:
+        return None
+    kind = expected.type or planned.joint.type
+    if kind not in {*_TURNING, _SLIDING}:
+        return None
+    origin = Pose(expected.xyz or planned.pose.xyz, expected.rotation or planned.pose.quat_xyzw)
+    axis = _unit(expected.axis or planned.joint.axis)
+    within = Offset(*expected.within)
+    return JointProbe(
+        parent=planned.parent,
+        child=planned.child,
+        type=kind,
+        origin=origin,
+        axis=axis,
+        within=within,
+    )
+
+
+def judge_declared_joint(
+    case: Case, pair: str, expected: JointExpectation, planned: PlanEdge
+) -> Iterator[Finding]:
+    """Yield a finding for each property that the robot file declares otherwise."""
+    joint, at = planned.joint, ("expect", "edges", pair, "joint")
+    if joint is None:
+        message = f"{pair}: expected a joint; the robot file has none there"
+        yield finding("TF931", message, case.span(*at))
+        return
+    for name, value, declared in (
+        ("name", expected.name, joint.name),
+        ("type", expected.type, joint.type),
+    ):
+        if value not in {None, declared}:
+            message = f"{pair}: expected the joint's {name} {value}; the robot file has {declared}"
+            yield finding("TF931", message, case.value_span(*at, name))
+    within = Offset(*expected.within)
+    if expected.axis is not None:
+        axes = _unit(expected.axis), _unit(joint.axis)
+        tilt = norm(tuple(a - b for a, b in zip(*axes, strict=True)))
+        if Offset(0.0, tilt).beyond(within):
+            message = (
+                f"{pair}: expected the axis {numbers(expected.axis)}; the robot file declares"
+                f" {numbers(joint.axis)}"
+            )
+            yield finding("TF931", message, case.value_span(*at, "axis"))
+    origin = Pose(expected.xyz or planned.pose.xyz, expected.rotation or planned.pose.quat_xyzw)
+    offset = offset_of(origin, planned.pose)
+    if offset.beyond(within):
+        message = (
+            f"{pair}: expected the joint's origin within {within.text}; the robot file places it"
+            f" {offset.text} away"
+        )
+        yield finding("TF931", message, case.span(*at))
+
+
+def judge_motion(case: Case, pair: str, probe: JointProbe) -> Iterator[Finding]:
+    """Yield a finding if the edge left the motion of its joint."""
+    if probe.pose is None:
+        return
+    xyz, quat = numbers(probe.pose.xyz), numbers(probe.pose.quat_xyzw)
+    message = (
+        f"{pair}: expected the motion of a {probe.type} joint about {numbers(probe.axis)} within"
+        f" {probe.within.text}; off by {probe.offset.text} at {probe.elapsed_s:.3f} s"
+    )
+    span = case.span("expect", "edges", pair, "joint")
+    yield finding("TF931", message, span, notes=[Note(f"it was xyz {xyz}, quat_xyzw {quat}")])
+
+
+def _unit(axis: Vector) -> Vector:
+    length = norm(axis)
+    x, y, z = axis
+    return (x / length, y / length, z / length)

@@ -11,12 +11,22 @@ from socket import AF_UNIX, socket
 
 import pytest
 
-from tfcompose.launcher import answers
+from tfcompose.launcher import answers, control
 from tfcompose.launcher.answers import CommandInputs, answer
-from tfcompose.launcher.control import LONGEST_REQUEST, Control
+from tfcompose.launcher.control import LONGEST_REQUEST, Control, ask, listen
 from tfcompose.launcher.events import NewPlan
+from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
 from tfcompose.launcher.state import initial
-from tfcompose.model.messages import Done, PlanChange, Refusal, Request, UpdateRequest, line_of
+from tfcompose.model.messages import (
+    Done,
+    PlanChange,
+    Refusal,
+    Request,
+    RobotStatus,
+    StatusRequest,
+    UpdateRequest,
+    line_of,
+)
 from tfcompose.model.plan import Plan, RosSettings
 from tfcompose.model.plan.file import write_plan
 
@@ -147,3 +157,15 @@ def test_a_plan_whose_reader_would_wait_is_refused(
     request = UpdateRequest(str(tmp_path / "plan.json"), str(tmp_path))
     refused, *_ = answer(request, initial(PLAN), setting(tmp_path))
     assert isinstance(refused, Refusal)
+
+
+def test_a_launcher_that_is_suspended_before_it_answers_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = RuntimeDir("rover@0", tmp_path, tmp_path)
+    lock, suspended = Lock(run), iter([False, True])
+    monkeypatch.setattr(control, "ANSWER_S", 0.05)
+    monkeypatch.setattr(control, "_is_suspended", lambda _: next(suspended))
+    with listen(run), pytest.raises(ConnectionError, match=f"kill -CONT {os.getpid()} "):
+        ask(run, StatusRequest(), RobotStatus)
+    lock.close()

@@ -55,6 +55,12 @@ def restored(files: RunFiles) -> bool:
     return is_restored
 
 
+def remove_at_once(folder: Path) -> None:
+    """Remove a folder, also while a launcher writes its files again."""
+    gone = folder.rename(folder.with_name(f"{folder.name}-gone"))
+    shutil.rmtree(gone)
+
+
 def are_complete(files: RunFiles, runtime_dir: RuntimeDir) -> bool:
     """Return whether commands find the run there: its holder, its socket, and the plan."""
     holder = runtime_dir.holder()
@@ -123,6 +129,19 @@ def test_a_folder_that_another_user_can_open_is_not_used(
     folder.chmod(0o777)
     with pytest.raises(PermissionError):
         restored(files)
+
+
+def test_the_link_names_the_plan_that_runs_and_comes_back(
+    files: RunFiles, rover_dir: RuntimeDir
+) -> None:
+    refused = rover_dir.plan_folder("3")
+    refused.mkdir()
+    assert rover_dir.linked_plan() == rover_dir.plan_folder("1")
+    files.keep(rover_dir.plan_folder("2") / "plan.json")
+    assert rover_dir.linked_plan() == rover_dir.plan_folder("2")
+    (rover_dir.folder / "running").unlink()
+    assert restored(files)
+    assert rover_dir.linked_plan() == rover_dir.plan_folder("2")
 
 
 def test_another_plan_is_kept_from_then_on(files: RunFiles, rover_dir: RuntimeDir) -> None:
@@ -207,12 +226,12 @@ def test_a_robot_whose_folder_was_removed_is_found_steered_and_repaired(tmp_path
         for _ in range(2):
             before = pid_of_reader()
             assert before
-            shutil.rmtree(tmp_path / "user")
+            remove_at_once(tmp_path / "user")
             os.kill(before, signal.SIGKILL)
             pids_before = {None, before}
             assert until(partial(is_another, pids_before))
             assert ask(runtime_dir, StatusRequest(), RobotStatus).processes[0].restarts <= 2
-        shutil.rmtree(tmp_path / "user")
+        remove_at_once(tmp_path / "user")
         assert until(partial(is_another, {None})), "without the start of a process, too"
         assert FILES_CHECK_S < 1
         assert ask(runtime_dir, DownRequest(), Done).ok

@@ -7,6 +7,7 @@ listeners and restarted processes get it, too. The robot file stays as it is.
 
 from __future__ import annotations
 
+import random
 import shutil
 import time
 from dataclasses import dataclass, replace
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 Edges = dict[str, "PlanEdge"]
 #: Number of earlier poses that an edge keeps; the built one is always among them.
 MOST_EARLIER = 100
-#: Attempts while others adjust the same robot.
-_ATTEMPTS = 5
+#: How long to try again while other commands change the plan, and the longest pause between two
+#: attempts, in seconds. The pauses are random: otherwise the quicker one of two commands wins
+#: each time.
+_RETRY_S, _PAUSE_S = 5.0, 0.05
 #: Copies of earlier adjustments are kept this long, for processes that are being started, in
 #: seconds.
 _KEPT_S = 5.0
@@ -89,7 +92,8 @@ def adjust(runtime_dir: RuntimeDir, choose: Callable[[Plan], Edges]) -> Edges:
         OSError: if the robot does not answer, or a file cannot be read or written.
         RejectedError, ValueError: if its plan cannot be read.
     """
-    for attempt in range(_ATTEMPTS):
+    end = time.monotonic() + _RETRY_S
+    while True:
         running = running_plan(runtime_dir)
         edges = choose(running.plan)
         plan = replace(
@@ -104,12 +108,12 @@ def adjust(runtime_dir: RuntimeDir, choose: Callable[[Plan], Edges]) -> Edges:
         try:
             ask(runtime_dir, AdjustRequest(str(folder / PLAN), str(running.file)), PlanChange)
         except RequestRefusedError:
-            if attempt == _ATTEMPTS - 1 or plan_file(runtime_dir) == running.file:
+            if time.monotonic() > end or plan_file(runtime_dir) == running.file:
                 raise
+            time.sleep(random.uniform(0, _PAUSE_S))  # noqa: S311 (no secret)
             continue
         _remove_earlier(runtime_dir, folder)
         return edges
-    raise AssertionError("the last attempt returns or raises")
 
 
 def _files_of(plan: Plan, folder: Path, edges: Edges) -> Mapping[str, bytes]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -212,7 +213,7 @@ def write_copy(parts: Mapping[str, bytes], folder: Path) -> None:
     for name, data in parts.items():
         file = folder / name
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        new = file.with_name(f".{file.name}.{os.getpid()}")
+        new = file.with_name(f".{file.name}.{os.getpid()}.{threading.get_ident()}")
         new.write_bytes(data)
         new.replace(file)
 

@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.options import DEFAULT_FILE
+from tfcompose.cli.plans import PLAN
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, wait_for_data, warn
 from tfcompose.foundation import procfs
@@ -353,16 +354,15 @@ def plan_file(runtime_dir: RuntimeDir) -> Path:
     """Return the path of the plan that the robot runs.
 
     Raises:
-        OSError: if the copy disappears.
-        ValueError: if there is no copy.
+        OSError: if the robot does not run.
     """
-    return max(runtime_dir.plan_folders(), key=lambda folder: folder.stat().st_mtime) / "plan.json"
+    return runtime_dir.linked_plan() / PLAN
 
 
 def plan_of_run(runtime_dir: RuntimeDir) -> Plan | None:
     """Return the plan that a robot runs, None if the plan cannot be read."""
     try:
-        return read_plan(plan_file(runtime_dir).read_text("utf-8"), "plan.json")
+        return read_plan(plan_file(runtime_dir).read_text("utf-8"), PLAN)
     except (OSError, ValueError, RejectedError):
         return None
 

@@ -122,13 +122,17 @@ def ask(runtime_dir: RuntimeDir, request: Request, answer: type[A]) -> A:
     """Return the launcher's answer to a request, as an ``answer``.
 
     Raises:
-        RefusedError: with the launcher's reason, if the launcher rejects the request.
+        RequestRefusedError: with the launcher's reason, if the launcher rejects the request.
         OSError: if no launcher runs the robot, or the launcher does not answer.
     """
     with connect(runtime_dir) as connection:
         connection.sendall(line_of(request))
-        with connection.makefile("rb") as lines:
-            line = lines.readline()
+        try:
+            with connection.makefile("rb") as lines:
+                line = lines.readline()
+        except TimeoutError:
+            _ensure_it_runs(runtime_dir)  # it can be suspended since connect() looked
+            raise
     if not line:
         raise ConnectionResetError("the launcher has ended")
     try:

@@ -1,6 +1,6 @@
 """Files of a run in its runtime directory, restored after something removes them.
 
-The files are the lock, the control socket, and the folder with the plan. The folder
+The files are the lock, the control socket, the folder with the plan, and a link to it. The folder
 ``/run/user/UID`` vanishes when the user's last session ends, unless the user lingers. Cleaning
 programs may remove other folders. Without the files, a restarting process finds no plan, and
 ``ps`` and ``down`` find no robot. So the launcher keeps the content of the files. If it may not
@@ -52,6 +52,7 @@ class RunFiles:
     def keep(self, plan_file: Path) -> None:
         """Keep the files of this plan from now on."""
         self.plan_file = plan_file
+        self._runtime_dir.link_plan(plan_file.parent)
         folder, self._kept = plan_file.parent, {}
         if folder.is_relative_to(self._runtime_dir.folder):
             self._kept = {
@@ -89,6 +90,7 @@ class RunFiles:
                 _identity(self._runtime_dir.folder / "lock") == _identity(self._lock.fd)
                 and _identity(self._runtime_dir.socket) == self._socket
                 and all((folder / name).is_file() for name in self._kept)
+                and self._runtime_dir.linked_plan() == folder
             )
         except OSError:
             return False
@@ -106,6 +108,7 @@ class RunFiles:
             for name, data in self._kept.items():
                 _write(folder / name, data)
             self.plan_file = folder / self.plan_file.name
+        runtime_dir.link_plan(self.plan_file.parent)
         self._runtime_dir = runtime_dir
 
     def _listen(self, runtime_dir: RuntimeDir) -> socket:

@@ -35,6 +35,8 @@ USERS = Path("/run/user")
 LOGGED_IN, LINGERING = Path("/run/systemd/users"), Path("/var/lib/systemd/linger")
 #: Prefix of the folder with a copy of the plan.
 _PLAN = "plan-"
+#: Name of the link to the folder of the plan that runs.
+_RUNNING = "running"
 
 
 class RuntimeDirError(Exception):
@@ -92,6 +94,25 @@ class RuntimeDir:
     def plan_folders(self) -> list[Path]:
         """Return the folders of existing copies of plans."""
         return list(self.folder.glob(f"{_PLAN}*"))
+
+    def link_plan(self, folder: Path) -> None:
+        """Make the folder known as that of the plan that runs.
+
+        Other copies of plans are there too: of requests that the launcher has refused, or has not
+        answered yet.
+        """
+        new = self.folder / f".running.{os.getpid()}"
+        new.unlink(missing_ok=True)
+        new.symlink_to(folder)
+        new.replace(self.folder / _RUNNING)
+
+    def linked_plan(self) -> Path:
+        """Return the folder of the plan that runs.
+
+        Raises:
+            OSError: if no plan runs.
+        """
+        return (self.folder / _RUNNING).readlink()
 
     def holder(self) -> Holder | None:
         """Return the launcher that currently runs the robot, or None."""

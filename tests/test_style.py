@@ -159,7 +159,7 @@ MOST_STATEMENTS = {
     "compiler": 10_870,
     "tf": 5_950,
     "guard": 4_553,
-    "launcher": 4_260,
+    "launcher": 4_280,
     "cli": 5_970,
     "tools": 19_080,
 }

@@ -235,7 +235,7 @@ EMPTY_NAMES = {
         *("found", "known", "wanted", "shown", "other", "others", "there", "own"),
     },
     "tests": {
-        *("one", "ones", "several", "meant"),
+        *("one", "ones", "several", "meant", "given"),
         *("found", "known", "wanted", "shown", "other", "others", "there", "own", "at"),
     },
 }

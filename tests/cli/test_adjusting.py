@@ -97,7 +97,9 @@ def test_every_description_has_the_pose_and_nothing_else_changes(
     edge = next(edge for edge in plan.edges if edge.child.endswith("mast"))
     assert plan.is_adjustable(edge)
     new = moved(edge, NEW)
-    changed = replace(plan, edges=tuple(new if each == edge else each for each in plan.edges))
+    changed = replace(
+        plan, edges=tuple(new if planned == edge else planned for planned in plan.edges)
+    )
     files = {
         name: data.decode()
         for name, data in _files_of(changed, tmp_path / "b", {edge.child: new}).items()

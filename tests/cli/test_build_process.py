@@ -38,7 +38,7 @@ def build_of(launcher: subprocess.Popen[str]) -> psutil.Process:
         return [
             process
             for process in below
-            if any("pydantic_core" in each.path for each in process.memory_maps())
+            if any("pydantic_core" in mapped.path for mapped in process.memory_maps())
         ]
 
     assert until(builds)

@@ -163,6 +163,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     plan_file = runtime_dir.plan_folder("0") / "plan.json"
     plan_file.parent.mkdir()
     plan_file.write_text(write_plan(plan), "utf-8")
+    runtime_dir.link_plan(plan_file.parent)
     yield tmp_path
     lock.close()
 

@@ -239,6 +239,7 @@ def test_a_suspended_launcher_is_named_at_once_and_hides_no_other_robot(
     once_s = time.monotonic() - began
     os.kill(launcher, signal.SIGSTOP)
     try:
+        assert until(lambda: psutil.Process(launcher).status() == psutil.STATUS_STOPPED)
         began = time.monotonic()
         listed = tfc("ps")
         assert f"rover@{os.environ['ROS_DOMAIN_ID']} " in listed.stderr

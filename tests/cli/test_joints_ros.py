@@ -75,7 +75,9 @@ def test_simulated_joints_move_and_a_new_description_arrives_at_run_time(
         heard: list[str] = []
 
         def has_reported(count: int) -> bool:
-            heard.extend(deserialize_message(each.data, String).data for each in texts.take())
+            heard.extend(
+                deserialize_message(message.data, String).data for message in texts.take()
+            )
             return len(heard) == count
 
         assert until(lambda: has_reported(1))

@@ -43,6 +43,7 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
             folder = runtime_dir.plan_folder("0")
             folder.mkdir()
             (folder / "plan.json").write_text(write_plan(plan), "utf-8")
+            runtime_dir.link_plan(folder)
             return runtime_dir
 
         yield run

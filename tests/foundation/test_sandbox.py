@@ -133,8 +133,8 @@ def test_some_calls_pass_with_some_arguments(
     program, number = sandbox.filter_program(column, architecture, files=True), numbers[column]
     if number is None:
         return
-    assert {verdict(program, architecture, number, given) for given in passing} <= {ALLOW}
-    assert {verdict(program, architecture, number, given) for given in refused} <= {
+    assert {verdict(program, architecture, number, arguments) for arguments in passing} <= {ALLOW}
+    assert {verdict(program, architecture, number, arguments) for arguments in refused} <= {
         REFUSE | errno.EPERM,
         REFUSE | errno.EINVAL,
     }

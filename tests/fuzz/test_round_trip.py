@@ -178,9 +178,9 @@ def matrix_of(edge: dict[str, Any]) -> Any:
 @given(robots())
 @settings(max_examples=40, deadline=None)
 def test_the_urdf_keeps_pose_type_and_limits_of_every_edge_below_base(
-    given: tuple[Any, list[Wanted]],
+    example: tuple[Any, list[Wanted]],
 ) -> None:
-    spec, expected = given
+    spec, expected = example
     read = yourdfpy.URDF.load(
         io.StringIO(built(spec)["robot.urdf"]), build_scene_graph=False, load_meshes=False
     )
@@ -205,9 +205,9 @@ def test_the_urdf_keeps_pose_type_and_limits_of_every_edge_below_base(
 @given(robots())
 @settings(max_examples=40, deadline=None)
 def test_the_plan_holds_every_edge_once_with_its_pose_and_owner(
-    given: tuple[Any, list[Wanted]],
+    example: tuple[Any, list[Wanted]],
 ) -> None:
-    spec, expected = given
+    spec, expected = example
     plan = json.loads(built(spec)["plan.json"])
     edges_by_child = {edge["child"]: edge for edge in plan["edges"]}
     assert len(edges_by_child) == len(plan["edges"]) == len(expected)
@@ -232,9 +232,9 @@ def test_the_plan_holds_every_edge_once_with_its_pose_and_owner(
 @given(robots())
 @settings(max_examples=40, deadline=None)
 def test_in_the_urdf_for_a_stock_publisher_only_edges_of_others_float(
-    given: tuple[Any, list[Wanted]],
+    example: tuple[Any, list[Wanted]],
 ) -> None:
-    spec, expected = given
+    spec, expected = example
     read = yourdfpy.URDF.load(
         io.StringIO(built(spec)["robot.state_publisher.urdf"]),
         build_scene_graph=False,
@@ -249,6 +249,6 @@ def test_in_the_urdf_for_a_stock_publisher_only_edges_of_others_float(
 
 @given(robots())
 @settings(max_examples=40, deadline=None)
-def test_a_second_build_is_the_same_byte_for_byte(given: tuple[Any, list[Wanted]]) -> None:
-    spec, _ = given
+def test_a_second_build_is_the_same_byte_for_byte(example: tuple[Any, list[Wanted]]) -> None:
+    spec, _ = example
     assert built(spec) == built(json.loads(json.dumps(spec)))

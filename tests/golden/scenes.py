@@ -1,4 +1,4 @@
-"""Histories and inputs that provoke each code of the live tree, for its wording.
+"""Histories and inputs that provoke grid code of the live tree, for its wording.
 
 No process runs: what judges is given what it would have seen.
 """
@@ -1086,9 +1086,9 @@ def _overlapping_lidars() -> Iterator[Finding]:
     text += "  rear: {parent: base_link, xyz: [0, 0, 0.3]}\n"
     compiled = compile_robot(text, "robot.yaml", library())
     assert compiled.robot is not None
-    a, b = (each.ravel() for each in np.meshgrid(np.linspace(-2, 2, 20), np.linspace(0, 2, 20)))
+    a, b = (grid.ravel() for grid in np.meshgrid(np.linspace(-2, 2, 20), np.linspace(0, 2, 20)))
     floor = np.column_stack([a, 2 * b - 2, np.full(a.size, -0.5)])
-    walls = [np.column_stack(each) for each in ((a, a * 0 + 2, b - 0.5), (a * 0 + 2, a, b - 0.5))]
+    walls = [np.column_stack(grid) for grid in ((a, a * 0 + 2, b - 0.5), (a * 0 + 2, a, b - 0.5))]
     points = np.vstack([floor, *walls])
     measurements = Measurements()
     for frame, offset in (("front", 0.0), ("rear", -0.12)):

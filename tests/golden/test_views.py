@@ -221,10 +221,10 @@ def views() -> dict[str, str]:
         write_bag(folder / "bag", [*FIXED, *drive(rate=20.0)])
         made = {}
         for view, commands in COMMANDS.items():
-            each = [
+            rows = [
                 printed(ROOT if "robots/" in command else folder, command) for command in commands
             ]
-            made[view] = "\n".join(each)
+            made[view] = "\n".join(rows)
         with mock.patch.object(ps, "_robots", return_value=({"rover@0": STATUS}, 0)):
             made["ps"] = printed(folder, "ps")
     lines = Lines()

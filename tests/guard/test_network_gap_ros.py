@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 pytestmark = [
     pytest.mark.ros,
     pytest.mark.slow,
-    pytest.mark.xdist_group("computers"),
+    pytest.mark.xdist_group("computers of the guard"),
     pytest.mark.skipif(bool(missing()), reason=missing() or "all is there"),
 ]
 
@@ -72,7 +72,8 @@ with Stop() as stop, RosFeed("view", observers) as feed:
 GAP_S = 25.0
 #: The rate of moving edges.
 HERTZ = 20.0
-GREEN_WITHIN_S = 10.0
+#: On a machine that runs other tests; alone it takes about 4 s.
+GREEN_WITHIN_S = 30.0
 #: How a link is cut and mended: at the socket, where interfaces notice, and farther off.
 LINK = {"socket": ("down", "up"), "path": ("nomaster", "master br0")}
 

@@ -390,10 +390,10 @@ def test_a_launch_file_is_remapped_in_full(tmp_path: Path) -> None:
     env = {"PATH": str(tmp_path), "AMENT_PREFIX_PATH": str(tmp_path)}
     commands, findings = inspect(tmp_path, nav, fence="remap", **env)
     assert findings == []
-    given = json.loads(commands["nav"].env[LAUNCH])
+    launch = json.loads(commands["nav"].env[LAUNCH])
     topics = {"/tf": "/_tfcompose/rover/nav/tf", "/tf_static": "/_tfcompose/rover/nav/tf_static"}
-    assert given["remap"] == topics | {"/scan": "/front/scan"}
-    assert given["arguments"] == {"a": "1"}
+    assert launch["remap"] == topics | {"/scan": "/front/scan"}
+    assert launch["arguments"] == {"a": "1"}
 
 
 def test_owners_that_no_remapping_reaches_are_one_finding(tmp_path: Path) -> None:

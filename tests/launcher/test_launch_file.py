@@ -35,11 +35,11 @@ module("launch", "LaunchDescription")
 module("launch.actions", "GroupAction", "IncludeLaunchDescription")
 module("launch.launch_description_sources", "AnyLaunchDescriptionSource")
 module("launch_ros"), module("launch_ros.actions", "PushRosNamespace", "SetRemap", "SetParameter")
-spec = importlib.util.spec_from_file_location("given", sys.argv[-1])
-given = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(given)
+spec = importlib.util.spec_from_file_location("launch_file", sys.argv[-1])
+launch_file = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(launch_file)
 import json
-print(json.dumps([sys.argv[1:-1], given.generate_launch_description()]))
+print(json.dumps([sys.argv[1:-1], launch_file.generate_launch_description()]))
 """  # noqa: E501 (a text as its reader has it)
 
 

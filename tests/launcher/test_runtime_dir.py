@@ -66,16 +66,17 @@ def test_a_robot_is_its_name_in_the_domain_of_its_plan_or_environment(
     )
 
 
-@pytest.mark.parametrize("given", ["", "relative", "/nowhere", "shared"])
+@pytest.mark.parametrize("variable", ["", "relative", "/nowhere", "shared"])
 def test_without_a_safe_runtime_folder_one_of_the_users_own_is_made(
-    given: str, env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    variable: str, env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "shared").mkdir(mode=0o777)
     (tmp_path / "shared").chmod(0o777)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(runtime_dir, "USERS", tmp_path / "nobody")
     rover = runtime_dir_of(
-        ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / given) if given == "shared" else given}
+        ROVER,
+        env | {"XDG_RUNTIME_DIR": str(tmp_path / variable) if variable == "shared" else variable},
     )
     assert rover.folder.parent == tmp_path / f"tfcompose-{os.getuid()}"
     assert rover.folder.parent.stat().st_mode & 0o777 == 0o700
@@ -87,9 +88,9 @@ def test_who_does_not_name_the_users_folder_uses_it_too(
     """As a service does, or cron: so that ``ps`` in a terminal sees what was started there."""
     monkeypatch.setattr(runtime_dir, "USERS", tmp_path)
     (tmp_path / str(os.getuid())).mkdir(mode=0o700)
-    given = runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / str(os.getuid()))})
+    in_session = runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / str(os.getuid()))})
     del env["XDG_RUNTIME_DIR"]
-    assert runtime_dir_of(ROVER, env) == given
+    assert runtime_dir_of(ROVER, env) == in_session
 
 
 @pytest.mark.parametrize("how", ["open to all", "a link"])

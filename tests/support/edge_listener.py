@@ -11,7 +11,7 @@ from tfcompose.tf.ros.tf_codec import decode
 
 
 class EdgeListener:
-    """Hears a moving edge in a thread of its own, and when each of its messages was sent."""
+    """Hears a moving edge in a thread of its own, and when transform of its messages was sent."""
 
     def __init__(self, child: str) -> None:
         self._child = child
@@ -42,5 +42,5 @@ class EdgeListener:
             while not self._stop.requested:
                 wait(node, [subscription], 1.0, self._stop)
                 for received in subscription.take():
-                    if any(each.child == self._child for each in decode(received.data)):
+                    if any(transform.child == self._child for transform in decode(received.data)):
                         self._sent_ns.append(received.source_ns)

@@ -29,7 +29,7 @@ class FakeNodes:
 
     def latched(self, node: Any, *transforms: tuple[str, str, Any, Any]) -> None:
         """Latch (parent, child, xyz, quaternion x y z w) as one message."""
-        data = encode([SentTransform(0, *each) for each in transforms])
+        data = encode([SentTransform(0, *transform) for transform in transforms])
         self.keep(TFPublisher(node, static=True)).publish(data)
 
     def moving(

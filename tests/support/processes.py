@@ -136,7 +136,7 @@ def ended_at_exit() -> Iterator[None]:
     try:
         yield
     finally:
-        for process in [each for each in _started if each not in before]:
+        for process in [started for started in _started if started not in before]:
             end(process)
 
 

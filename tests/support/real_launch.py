@@ -1,4 +1,4 @@
-"""What ROS's launch would start: each process is recorded in its place, and none is started.
+"""What ROS's launch would start: part process is recorded in its place, and none is started.
 
 ``python real_launch.py OUT FILE [NAME:=VALUE …]`` writes the commands, with the parameters of
 their files, as JSON.
@@ -62,10 +62,10 @@ def record(action: Any, context: Any) -> None:
 def text_of(value: Any, context: Any) -> Any:
     """Return a setting with its substitutions performed, and the kinds of the actions in it."""
     value = [value] if hasattr(value, "visit") else value
-    if isinstance(value, list) and all(hasattr(each, "perform") for each in value):
+    if isinstance(value, list) and all(hasattr(part, "perform") for part in value):
         return "".join(map(context.perform_substitution, value))
     if isinstance(value, list | tuple):
-        return [type(each).__name__ for each in value]
+        return [type(part).__name__ for part in value]
     return value if isinstance(value, str | float | dict | None) else str(value)
 
 
@@ -109,8 +109,8 @@ def main(out: str, file: str, *arguments: str) -> None:
     ExecutableInPackage.perform = executable
     LoadComposableNodes._load_in_sequence = record_loaded
     service = LaunchService(noninteractive=True)
-    given = [tuple(word.split(":=", 1)) for word in arguments]
-    included = IncludeLaunchDescription(AnyLaunchDescriptionSource(file), launch_arguments=given)
+    values = [tuple(word.split(":=", 1)) for word in arguments]
+    included = IncludeLaunchDescription(AnyLaunchDescriptionSource(file), launch_arguments=values)
     service.include_launch_description(LaunchDescription([included]))
     service.run(shutdown_when_idle=True)
     Path(out).write_text(json.dumps(STARTED), encoding="utf-8")

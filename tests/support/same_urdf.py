@@ -174,9 +174,10 @@ def _joint(joint: Any) -> dict[str, Any]:
     for tag, values in _motion(kind, joint.find("limit") is not None).items():
         element = joint.find(tag)
         if element is not None or tag == "limit":
-            given = {} if element is None else element.attrib
+            attributes = {} if element is None else element.attrib
             output[tag] = {
-                key: float(given[key]) if key in given else usual for key, usual in values.items()
+                key: float(attributes[key]) if key in attributes else usual
+                for key, usual in values.items()
             }
     mimic = joint.find("mimic")
     if mimic is not None:

@@ -457,8 +457,12 @@ def test_parameters_of_a_process_with_nodes_are_for_each_of_its_nodes() -> None:
     nodes = "nodes: {b: {params: {x: 3}}, c: {}}, params: {x: 1, y: 2}"
     files = files_of(f"a: {{{EXE}, {nodes}}}")
     params = yaml.safe_load(files["params/a.yaml"])
-    given = {node: value["ros__parameters"] for node, value in params.items()}
-    assert given == {"/**": {"x": 1, "y": 2}, "/r1/b": {"x": 3, "y": 2}, "/r1/c": {"x": 1, "y": 2}}
+    params_by_node = {node: value["ros__parameters"] for node, value in params.items()}
+    assert params_by_node == {
+        "/**": {"x": 1, "y": 2},
+        "/r1/b": {"x": 3, "y": 2},
+        "/r1/c": {"x": 1, "y": 2},
+    }
 
 
 ROS2 = {

@@ -168,9 +168,9 @@ def test_every_value_of_a_vendor_keeps_its_source(preset: str) -> None:
             for key, value in stream_optics
             if value is not None and key not in {"frame", "kind", "source", "when"}
         }
-        given = {key for source in stream_optics.source or () for key in source.of}
+        source_keys = {key for source in stream_optics.source or () for key in source.of}
         exempt = {"backward"} | ({"vertical"} if stream_optics.vertical == (0, 0) else set())
-        assert keys - exempt == given - exempt, stream
+        assert keys - exempt == source_keys - exempt, stream
 
 
 def test_a_scanner_has_no_height_and_a_t265_views_backward() -> None:

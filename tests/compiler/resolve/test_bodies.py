@@ -98,10 +98,10 @@ parts = st.lists(st.tuples(st.tuples(sizes, sizes, sizes), places, angles), min_
 @settings(
     max_examples=40, deadline=None, phases=[Phase.explicit, Phase.generate]
 )  # shrinking takes ten minutes
-def test_several_turned_boxes_have_the_inertia_of_their_triangles(given: list[Any]) -> None:
+def test_several_turned_boxes_have_the_inertia_of_their_triangles(boxes: list[Any]) -> None:
     """The products of inertia too: trimesh integrates over the triangles of all boxes together."""
     meshes, shapes = [], []
-    for size, xyz, rpy in given:
+    for size, xyz, rpy in boxes:
         mesh = trimesh.creation.box(size)
         rotation = Rotation.from_euler("xyz", rpy).as_matrix()
         mesh.vertices = mesh.vertices @ rotation.T + xyz  # apply_transform does nothing below 1e-8

@@ -157,8 +157,8 @@ def test_what_yourdfpy_does_not_read_is_not_claimed(case: str) -> None:
 def test_nothing_is_emitted_that_is_not_the_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def wrong(*given: Any, **more: Any) -> Any:
-        kept = work_emit(*given, **more)
+    def wrong(*values: Any, **more: Any) -> Any:
+        kept = work_emit(*values, **more)
         return tuple(
             type(file)(
                 file.path,

@@ -184,8 +184,8 @@ def test_joints_without_states_are_named_once_after_5_s_with_other_senders(
     ):
         monkeypatch.setattr(module, name, value)
     joints.joints(read_own([str(file), "joints"], "joints"), stop)
-    assert [[transform.child for transform in decode(each)] for each in sent] == [["right"]]
-    (line,) = [each for each in capsys.readouterr().out.splitlines() if "no joint state" in each]
+    assert [[transform.child for transform in decode(message)] for message in sent] == [["right"]]
+    (line,) = [text for text in capsys.readouterr().out.splitlines() if "no joint state" in text]
     who = f"comes from {senders[0]}" if senders else "no node publishes /rover/joint_states"
     assert line.startswith("no joint state after 5 s for left: ")
     assert who in line

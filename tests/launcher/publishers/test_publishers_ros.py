@@ -151,16 +151,18 @@ def test_processes_end_before_their_next_message_and_report_no_time_once(
     edges = [edge("map odom", "simulate"), edge("a b")]
     file = write(edges, *processes, clock="sim")
     running = [start(kind, file, kind) for kind in kinds]
-    for each in running[:3]:
-        each.until_says("edge")
-    for each in running[2:]:
-        each.until_says("no time on /clock after 5 s: the plan's clock is sim, and nobody publis")
+    for publisher in running[:3]:
+        publisher.until_says("edge")
+    for publisher in running[2:]:
+        publisher.until_says(
+            "no time on /clock after 5 s: the plan's clock is sim, and nobody publis"
+        )
     time.sleep(0.5)
-    for each in running:
-        code = each.end(signal.SIGTERM)
-        each.close()
-        assert (code, each.errors) == (0, [])
-        assert each.output.count("/clock") == (each in running[2:])
+    for publisher in running:
+        code = publisher.end(signal.SIGTERM)
+        publisher.close()
+        assert (code, publisher.errors) == (0, [])
+        assert publisher.output.count("/clock") == (publisher in running[2:])
 
 
 def test_an_interrupt_during_the_start_ends_silently_too(start: Make, write: Make) -> None:

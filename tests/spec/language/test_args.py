@@ -64,13 +64,13 @@ frames:
 
 
 @pytest.mark.parametrize(
-    ("given", "environment", "count"),
+    ("values", "environment", "count"),
     [({}, {}, 2), ({"cameras": "3"}, {"CAMERAS": "1"}, 3), ({}, {"CAMERAS": "1"}, 1)],
 )
 def test_the_command_line_precedes_the_environment_and_that_the_default(
-    given: dict[str, str], environment: dict[str, str], count: int
+    values: dict[str, str], environment: dict[str, str], count: int
 ) -> None:
-    made = robot(built(CAMERAS, given, environment))
+    made = robot(built(CAMERAS, values, environment))
     assert [*made.frames] == [*(f"camera_{i}" for i in range(count)), "base_link"]
     assert [edge.pose.xyz[1] for edge in made.edges] == pytest.approx(
         [0.1 * i for i in range(count)]
@@ -79,7 +79,7 @@ def test_the_command_line_precedes_the_environment_and_that_the_default(
 
 
 @pytest.mark.parametrize(
-    ("text", "given", "code", "names"),
+    ("text", "values", "code", "names"),
     [
         ("cameras: {default: 2, max: 4}", {"cameras": "5"}, "TF106", "4"),
         ("cameras: 2", {"cameras": "two"}, "TF103", "cameras"),
@@ -92,16 +92,16 @@ def test_the_command_line_precedes_the_environment_and_that_the_default(
     ],
 )
 def test_a_wrong_value_is_a_finding_that_names_what_can_be(
-    text: str, given: dict[str, str], code: str, names: str
+    text: str, values: dict[str, str], code: str, names: str
 ) -> None:
     name = text.partition(":")[0]
     uses = "vars: {x: '${args.NAME}'}\nprocesses: {p: {run: [x, '${x}']}}\n".replace("NAME", name)
-    (finding,) = built(f"args: {{{text}}}\n{uses}", given).errors
+    (finding,) = built(f"args: {{{text}}}\n{uses}", values).errors
     assert finding.code == code
     assert names in finding.message + finding.help
     assert finding.span
     assert (
-        finding.span.file == "".join(f"{text}:={value}" for text, value in given.items())
+        finding.span.file == "".join(f"{text}:={value}" for text, value in values.items())
         or finding.span.file == "r.yaml"
     )
 
@@ -328,8 +328,8 @@ def test_a_parameter_takes_its_arguments_type_in_any_form_of_the_value(
         f"args: {{rate: {declared}}}\nprocesses: {{n: {{run: [n], params: {{rate:"
         ' "${args.rate}"}}}\n'
     )
-    for given in ({}, {"rate": "7"}):
+    for values in ({}, {"rate": "7"}):
         (process,) = (
-            process for process in robot(built(text, given)).processes if process.name == "n"
+            process for process in robot(built(text, values)).processes if process.name == "n"
         )
         assert type(process.ros_nodes[0].params["rate"]) is type_

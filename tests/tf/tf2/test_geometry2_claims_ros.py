@@ -410,12 +410,12 @@ def test_a_cloud_is_moved_by_the_buffer_and_its_other_fields_stay() -> None:
     buffer, message = Buffer(), TransformStamped(child_frame_id="base_footprint")
     message.header.frame_id, message.transform.translation.z = "test", 100.0
     buffer.set_transform_static(message, "unittest")
-    given = cloud(np.hstack([POINTS, [[9], [9]]]), "xyza")
-    before = bytes(given.data)
-    moved = buffer.transform(given, "base_footprint")
+    extended = cloud(np.hstack([POINTS, [[9], [9]]]), "xyza")
+    before = bytes(extended.data)
+    moved = buffer.transform(extended, "base_footprint")
     assert moved.header.frame_id == "base_footprint"
     assert np.allclose(points_of(moved), np.hstack([POINTS - (0, 0, 100), [[9], [9]]]))
-    assert bytes(given.data) == before
+    assert bytes(extended.data) == before
 
 
 @pytest.mark.parametrize(

@@ -37,20 +37,20 @@ def histories() -> list[list[Step]]:
 @pytest.mark.parametrize("index", range(HISTORIES))
 def test_a_recorded_history_has_the_recorded_answers(index: int) -> None:
     buffer = Buffer()
-    for what, given, answer in histories()[index]:
+    for what, arguments, answer in histories()[index]:
         if what == "set":
-            stamp_ns, static, *row = given
+            stamp_ns, static, *row = arguments
             buffer.insert([(row[0], row[1], *divmod(stamp_ns, S), *row[2:])], static=static)
         elif what == "clear":
             buffer.clear()
         else:
-            assert_same(ask(buffer, what, given), answer)
+            assert_same(ask(buffer, what, arguments), answer)
 
 
-def ask(buffer: Buffer, what: str, given: list[Any]) -> Any:
+def ask(buffer: Buffer, what: str, arguments: list[Any]) -> Any:
     try:
         call = buffer.lookup_transform if what == "lookup" else buffer.lookup_transform_full
-        return packed(call(*given))
+        return packed(call(*arguments))
     except TransformException as error:
         return type(error).__name__
 
@@ -120,11 +120,11 @@ def record() -> None:
     from geometry_msgs.msg import TransformStamped  # noqa: PLC0415 (the same)
     from rclpy.time import Time  # noqa: PLC0415 (the same)
 
-    def answer(buffer: Any, what: str, given: list[Any]) -> Any:
+    def answer(buffer: Any, what: str, arguments: list[Any]) -> Any:
         if what == "clear":
             return buffer.clear()
         if what == "set":
-            stamp_ns, static, *row = given
+            stamp_ns, static, *row = arguments
             message = TransformStamped()
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, S)
             message.header.frame_id, message.child_frame_id = row[:2]
@@ -133,7 +133,7 @@ def record() -> None:
             return (buffer.set_transform_static if static else buffer.set_transform)(
                 message, "recorded"
             )
-        times = [Time(nanoseconds=each) if isinstance(each, int) else each for each in given]
+        times = [Time(nanoseconds=each) if isinstance(each, int) else each for each in arguments]
         try:
             numbers = packed(
                 getattr(buffer, f"{what}_core".replace("lookup", "lookup_transform"))(*times)
@@ -147,7 +147,8 @@ def record() -> None:
         buffer = tf2.BufferCore()
         lines.append(["new", [seed], None])
         lines += [
-            [what, given, answer(buffer, what, given)] for what, given in made(random.Random(seed))
+            [what, arguments, answer(buffer, what, arguments)]
+            for what, arguments in made(random.Random(seed))
         ]
     FILE.write_text(
         "".join(json.dumps(line, separators=(",", ":")) + "\n" for line in lines), "utf-8"

@@ -113,13 +113,15 @@ def header(frame: str = "laser", sec: int = 5) -> Header:
 
 
 def test_a_point_is_turned_and_moved_and_gets_the_frame_and_the_time() -> None:
-    given = PointStamped(header(), Vector3(0.5, -1.0, 2.0))
-    moved = laser().transform(given, "base")
+    original = PointStamped(header(), Vector3(0.5, -1.0, 2.0))
+    moved = laser().transform(original, "base")
     assert (moved.point.x, moved.point.y, moved.point.z) == pytest.approx(
         tuple(ROTATION.apply([0.5, -1, 2]) + XYZ)
     )
     assert moved.header == Header(Time(5, 7), "base")
-    assert given == PointStamped(header(), Vector3(0.5, -1.0, 2.0)), "what was given is left alone"
+    assert original == PointStamped(header(), Vector3(0.5, -1.0, 2.0)), (
+        "the argument is left alone"
+    )
     newest = laser().transform(PointStamped(Header(Time(), "laser"), Vector3()), "base")
     assert newest.header.stamp == Time(9, 0)
 
@@ -133,11 +135,11 @@ def test_a_vector_is_turned_and_not_moved() -> None:
 
 def test_every_corner_of_a_polygon_is_moved() -> None:
     corners = [(0.5, -1.0, 2.0), (0.0, 0.0, 0.0), (3.0, 4.0, 5.0)]
-    given = PolygonStamped(header(), Polygon([Vector3(*corner) for corner in corners]))
-    moved = laser().transform(given, "base")
+    original = PolygonStamped(header(), Polygon([Vector3(*corner) for corner in corners]))
+    moved = laser().transform(original, "base")
     points = [(corner.x, corner.y, corner.z) for corner in moved.polygon.points]
     assert points == pytest.approx(ROTATION.apply(corners) + XYZ)
-    assert (given.polygon.points[0].x, moved.header.frame_id) == (0.5, "base")
+    assert (original.polygon.points[0].x, moved.header.frame_id) == (0.5, "base")
 
 
 @pytest.mark.parametrize(
@@ -163,10 +165,10 @@ def test_covariances_are_turned_with_both_sides() -> None:
     rng = np.random.default_rng(3)
     spread = rng.normal(size=(6, 6))
     covariance = spread @ spread.T
-    given = PoseWithCovarianceStamped(
+    original = PoseWithCovarianceStamped(
         header(), Known(Placed(Vector3(), Quaternion()), covariance.reshape(-1).tolist())
     )
-    moved = laser().transform(given, "base")
+    moved = laser().transform(original, "base")
     both = np.kron(np.eye(2), ROTATION.as_matrix())
     assert np.array(moved.pose.covariance).reshape(6, 6) == pytest.approx(
         both @ covariance @ both.T
@@ -179,8 +181,8 @@ def test_between_two_times_a_point_is_moved_through_the_fixed_frame() -> None:
     buffer = Buffer()
     for second in range(1, 9):
         buffer.set("odom", "base", Pose((float(second), 0, 0)), second * S, static=False)
-    given = PointStamped(Header(Time(2), "base"), Vector3(1.0))
-    moved = buffer.transform_full(given, "base", Time(6), "odom")
+    original = PointStamped(Header(Time(2), "base"), Vector3(1.0))
+    moved = buffer.transform_full(original, "base", Time(6), "odom")
     assert (moved.point.x, moved.header.stamp) == (-3.0, Time(6))
 
 
@@ -287,10 +289,10 @@ class Layout:
 @pytest.mark.parametrize("seed", range(40))
 def test_a_cloud_of_any_layout_is_moved_and_every_other_byte_stays(seed: int) -> None:
     layout = Layout(random.Random(seed))
-    given = layout.cloud()
-    before = bytes(given.data)
-    moved = laser().transform(given, "base")
-    assert bytes(given.data) == before
+    original = layout.cloud()
+    before = bytes(original.data)
+    moved = laser().transform(original, "base")
+    assert bytes(original.data) == before
     assert isinstance(moved.data, array)
     after = bytes(moved.data)
     assert len(after) == len(before)
@@ -310,20 +312,20 @@ def test_a_cloud_of_any_layout_is_moved_and_every_other_byte_stays(seed: int) ->
     )
     assert moved.header == Header(Time(5, 7), "base")
     same = ("height", "width", "fields", "is_bigendian", "point_step", "row_step", "is_dense")
-    assert all(getattr(moved, name) == getattr(given, name) for name in same)
+    assert all(getattr(moved, name) == getattr(original, name) for name in same)
 
 
 def xyz_cloud(**changes: Any) -> PointCloud2:
     fields = [PointField(name, 4 * index, 7) for index, name in enumerate("xyz")]
-    given: dict[str, Any] = {
+    original: dict[str, Any] = {
         "height": 1,
         "width": 2,
         "point_step": 12,
         "row_step": 24,
         "data": bytes(24),
     }
-    given |= {"fields": fields, "is_bigendian": False} | changes
-    return PointCloud2(header(), **given)
+    original |= {"fields": fields, "is_bigendian": False} | changes
+    return PointCloud2(header(), **original)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from tests.support.waiting import TIMEOUT_S, until
 pytestmark = [
     pytest.mark.ros,
     pytest.mark.slow,
-    pytest.mark.xdist_group("computers"),
     pytest.mark.skipif(bool(missing()), reason=missing() or "all is there"),
 ]
 
@@ -51,6 +50,10 @@ SIMULATED = "simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: rear"
 SILENT = ROBOT.replace(SIMULATED, 'run: [sh, -c, "sleep 1000"], host: rear')
 #: The same, and a frame vanishes: nothing goes on.
 SILENT_ANEW = SILENT.replace("  lidar: {parent: base_link, xyz: [0, 0, 0.3]}\n", "")
+#: Two workers at once, each with computers of its own.
+first_computers, second_computers = (
+    pytest.mark.xdist_group(f"computers {number}") for number in (1, 2)
+)
 each_way = pytest.mark.parametrize(
     "silent", [SILENT, SILENT_ANEW], ids=["followed", "started_anew"]
 )
@@ -114,6 +117,7 @@ def journals(computers: Computers) -> str:
     )
 
 
+@first_computers
 def test_from_nothing_all_hosts_go_live_and_a_second_run_changes_nothing(
     computers: Computers,
 ) -> None:
@@ -132,6 +136,7 @@ def test_from_nothing_all_hosts_go_live_and_a_second_run_changes_nothing(
     assert next(mesh).stat().st_size == 84
 
 
+@first_computers
 def test_what_would_change_is_listed_and_shown_and_changes_nothing(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
@@ -150,6 +155,7 @@ def test_what_would_change_is_listed_and_shown_and_changes_nothing(computers: Co
     assert deploy(computers, ROBOT, "--check").returncode == 0
 
 
+@first_computers
 @each_way
 def test_a_release_that_does_not_come_up_is_taken_back_everywhere(
     computers: Computers, silent: str
@@ -178,6 +184,7 @@ def children(computers: Computers, name: str) -> dict[str, int]:
     return {process["name"]: process["pid"] for process in robot["processes"] if process["pid"]}
 
 
+@first_computers
 def test_only_what_is_different_starts_again(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     launchers = {name: runs(computers, name) for name in NAMES}
@@ -218,6 +225,7 @@ def test_only_what_is_different_starts_again(computers: Computers) -> None:
     assert anew == {*NAMES}, "who reads a file is not known"
 
 
+@first_computers
 def test_a_host_that_is_down_is_named_before_anything_changes(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before, launcher = current(computers), runs(computers, "brain")
@@ -232,9 +240,15 @@ def test_a_host_that_is_down_is_named_before_anything_changes(computers: Compute
     finally:
         computers.boot("rear")
     assert (current(computers), runs(computers, "brain")) == (before, launcher)
-    assert until(lambda: is_complete(computers)), journals(computers)
+    again = deploy(computers, ROBOT)
+    assert (again.returncode, "nothing to change" in again.stdout) == (0, True), (
+        "it waits for a host that has just booted",
+        again,
+        journals(computers),
+    )
 
 
+@first_computers
 @each_way
 def test_a_host_that_loses_power_in_the_middle_takes_all_back(
     computers: Computers, silent: str
@@ -255,6 +269,7 @@ def test_a_host_that_loses_power_in_the_middle_takes_all_back(
     assert until(lambda: is_complete(computers)), journals(computers)
 
 
+@first_computers
 @each_way
 def test_whoever_deploys_may_be_killed(computers: Computers, silent: str) -> None:
     assert deploy(computers, ROBOT).returncode == 0
@@ -268,6 +283,7 @@ def test_whoever_deploys_may_be_killed(computers: Computers, silent: str) -> Non
     assert current(computers) == before
 
 
+@second_computers
 def test_clocks_that_are_apart_are_found_before_the_start(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
@@ -305,6 +321,7 @@ def own_domains(computers: Computers) -> Iterator[None]:
     boot_in({name: {} for name in NAMES})
 
 
+@second_computers
 @pytest.mark.usefixtures("own_domains")
 def test_hosts_with_domains_of_their_own_need_one_of_the_robots(computers: Computers) -> None:
     before = current(computers)
@@ -320,6 +337,7 @@ def test_hosts_with_domains_of_their_own_need_one_of_the_robots(computers: Compu
     assert "nothing to change" in again.stdout, again
 
 
+@second_computers
 def test_rollback_returns_to_the_release_before(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
@@ -333,6 +351,7 @@ def test_rollback_returns_to_the_release_before(computers: Computers) -> None:
     assert deploy(computers, ROBOT, "--check").returncode == 0
 
 
+@second_computers
 def test_of_two_at_once_the_second_says_who_holds_the_hosts(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
@@ -354,6 +373,7 @@ def events_in(file: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in lines if line.endswith("\n")]
 
 
+@second_computers
 def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
 
@@ -401,6 +421,7 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0, "what is down is started again"
 
 
+@second_computers
 def test_a_robot_of_a_fleet_shares_its_edges_from_the_host_of_static(computers: Computers) -> None:
     fleet = "fleet: 1\nshare: [base_link → lidar]\nrobots: {rover: {router: tcp/10.77.0.1:7447}}\n"
     (computers.folder / "robot/fleet.yaml").write_text(fleet)
@@ -417,6 +438,7 @@ def test_a_robot_of_a_fleet_shares_its_edges_from_the_host_of_static(computers: 
     assert "fleet_share" not in children(computers, "brain")
 
 
+@second_computers
 def test_a_release_has_the_overlay_of_the_computer_that_runs_static(
     computers: Computers,
 ) -> None:
@@ -437,6 +459,7 @@ def test_a_release_has_the_overlay_of_the_computer_that_runs_static(
         assert json.loads(plan.read_text())["overlays"] == [f"units/{overlay}"]
 
 
+@second_computers
 def test_one_host_alone_is_deployed_to_and_waited_for(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)

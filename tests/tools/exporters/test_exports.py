@@ -346,7 +346,7 @@ def load(text: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Recorde
     """Return the actions of a launch file, with stand-ins for what it imports of launch."""
 
     def kind(name: str) -> Any:
-        return lambda *words, **given: Recorded(kind=name, words=words, **given)
+        return lambda *words, **options: Recorded(kind=name, words=words, **options)
 
     for module in (
         "ament_index_python",
@@ -405,11 +405,12 @@ def sent(actions: list[Recorded]) -> dict[tuple[str, str], list[float] | None]:
                     ends = tuple(str(joint.find(end).get("link")) for end in ("parent", "child"))  # type: ignore[union-attr]
                     edges[ends] = None  # type: ignore[index]
         elif getattr(action, "executable", "") == "static_transform_publisher":
-            given = dict(zip(action.arguments[::2], action.arguments[1::2], strict=True))
-            ends = (given["--frame-id"], given["--child-frame-id"])
+            options = dict(zip(action.arguments[::2], action.arguments[1::2], strict=True))
+            ends = (options["--frame-id"], options["--child-frame-id"])
             assert ends not in edges
             edges[ends] = [
-                float(given[key]) for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
+                float(options[key])
+                for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
             ]
     return edges
 
@@ -509,10 +510,10 @@ def test_a_stock_state_publisher_passes_on_as_many_joint_states_as_ours(
         for action in actions
         if getattr(action, "executable", "") == "robot_state_publisher"
     )
-    (given,) = node.parameters
-    assert given.pop("robot_description").value_type is str
+    (passed,) = node.parameters
+    assert passed.pop("robot_description").value_type is str
     expected = {**parameters, "use_sim_time": True}
-    assert given == expected | ({"ignore_timestamp": True} if "ignore" in joints else {})
+    assert passed == expected | ({"ignore_timestamp": True} if "ignore" in joints else {})
 
 
 def test_stock_nodes_send_where_ours_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

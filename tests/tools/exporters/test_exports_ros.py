@@ -338,7 +338,7 @@ def actions_of(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Action]:
     """
 
     def kind(name: str) -> Any:
-        return lambda *words, **given: Action(kind=name, words=words, **given)
+        return lambda *words, **options: Action(kind=name, words=words, **options)
 
     text = file.read_text("utf-8")
     for module in re.findall(r"^from ([a-z_.]+) import", text, re.MULTILINE):
@@ -366,10 +366,10 @@ def run_actions(actions: list[Action], folder: Path) -> None:
         if command is None:
             words = [sys.executable, str(stock), *getattr(action, "arguments", ()), "--ros-args"]
             command = [*words, "-r", f"__node:={action.name}", "-r", f"__ns:=/{action.namespace}"]
-            for given in getattr(action, "parameters", ()):
+            for parameters in getattr(action, "parameters", ()):
                 values = {
                     name: value.words[0] if isinstance(value, Action) else value
-                    for name, value in given.items()
+                    for name, value in parameters.items()
                 }
                 file = folder / f"{number}.yaml"
                 file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), "utf-8")

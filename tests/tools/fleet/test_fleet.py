@@ -118,18 +118,18 @@ def test_no_pose_is_given_over_a_broken_link_and_new_ones_after(
 ) -> None:
     observer = observe(two.routers)
     assert observer.wait(60)
-    given: list[tuple[float, float]] = []
+    poses: list[tuple[float, float]] = []
 
     def pose() -> bool:
         """Look the pose up as often as it can be.
 
-        Whether it was given, and how old it was then.
+        Whether there was one, and how old it was then.
         """
         try:
             _, stamp_ns = observer.pose("r1/base_link", "r2/base_link")
         except (StaleError, TransformException):
             return False
-        given.append((time.monotonic(), time.time() - (stamp_ns or 0) / 1e9))
+        poses.append((time.monotonic(), time.time() - (stamp_ns or 0) / 1e9))
         return True
 
     assert until(pose)
@@ -137,15 +137,15 @@ def test_no_pose_is_given_over_a_broken_link_and_new_ones_after(
     broken = time.monotonic()
     assert until(lambda: not pose())
     assert time.monotonic() - broken < 3.0
-    before = len(given)
+    before = len(poses)
     while time.monotonic() - broken < broken_s:
         pose()
         time.sleep(0.05)
-    assert len(given) == before, "none while it was broken"
+    assert len(poses) == before, "none while it was broken"
     two.link.mend()
     assert until(pose)
-    assert until(lambda: pose() and given[-1][1] < 1.0)
-    assert max(age_s for _, age_s in given) < 3.0, "and none of those that the link had held back"
+    assert until(lambda: pose() and poses[-1][1] < 1.0)
+    assert max(age_s for _, age_s in poses) < 3.0, "and none of those that the link had held back"
     assert {edge.state for edge in observer.status()} == {"live"}
 
 

@@ -1,4 +1,4 @@
-"""The import of an exported launch file is the same robot, whatever its arguments are given."""
+"""The import of an exported launch file is the same robot, whatever its arguments are values."""
 
 from itertools import product
 from pathlib import Path
@@ -136,13 +136,13 @@ def back(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     return import_of(launch_file, "--all-branches", code=None)[0], launch_file.parent
 
 
-@pytest.mark.parametrize("given", COMBINATIONS, ids=lambda given: "-".join(given.values()))
+@pytest.mark.parametrize("values", COMBINATIONS, ids=lambda values: "-".join(values.values()))
 def test_arguments_and_conditions_are_there_again(
-    given: dict[str, str], back: tuple[str, Path], tmp_path: Path
+    values: dict[str, str], back: tuple[str, Path], tmp_path: Path
 ) -> None:
     before, after = (
-        compiled(ARGUED, tmp_path, **given).robot,
-        compiled(back[0], back[1], **given).robot,
+        compiled(ARGUED, tmp_path, **values).robot,
+        compiled(back[0], back[1], **values).robot,
     )
     assert before
     assert after

@@ -90,11 +90,11 @@ def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str
     ]
     remap = dict(reversed([rule.split(":=", 1) for rule in rules]))  # the first one counts
     name, namespace = remap.pop("__node", ""), remap.pop("__ns", "/")
-    given = [
+    parameters = [
         right for left, right in zip(rest[split:], rest[split + 1 :], strict=False) if left == "-p"
     ]
     params: dict[str, Any] = {
-        name: yaml.safe_load(value) for name, value in (arg.split(":=", 1) for arg in given)
+        name: yaml.safe_load(value) for name, value in (arg.split(":=", 1) for arg in parameters)
     }
     for file in files:
         for node in file.values():
@@ -267,21 +267,21 @@ def generate_launch_description():
 """
 
 
-@pytest.mark.parametrize("given", COMBINATIONS, ids=lambda given: "-".join(given.values()))
+@pytest.mark.parametrize("values", COMBINATIONS, ids=lambda values: "-".join(values.values()))
 def test_launch_starts_an_export_like_the_plan_with_the_same_arguments(
-    given: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    values: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """But for what waits for another one's end: here no process is started."""
     share = installed("nav2_bringup", tmp_path, monkeypatch)
     (share / "navigation_launch.py").write_text(INCLUDED, encoding="utf-8")
     (tmp_path / "argued.yaml").write_text(ARGUED, encoding="utf-8")
     file = exported(tmp_path / "argued.yaml", tmp_path / "out")
-    processes = started(file, *(f"{name}:={value}" for name, value in given.items()))
-    robot = compiled(ARGUED, tmp_path, **given).robot
+    processes = started(file, *(f"{name}:={value}" for name, value in values.items()))
+    robot = compiled(ARGUED, tmp_path, **values).robot
     assert robot
     expected = of_robot(robot)
     is_included = expected.pop("nav2_bringup/navigation_launch.py", None) is not None
-    assert (processes.pop("included", {}).get("words") == [given["mode"], "3"]) is is_included
+    assert (processes.pop("included", {}).get("words") == [values["mode"], "3"]) is is_included
     assert processes.pop("robot_state_publisher")["params"].keys() == {
         "publish_frequency",
         "robot_description",
@@ -344,17 +344,17 @@ def generate_launch_description():
 READER = """
 import json, rclpy, sys
 rclpy.init(args=sys.argv[1:])
-given = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
+options = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
 for name in "nm":
-    node = rclpy.create_node(name, **given)
+    node = rclpy.create_node(name, **options)
     print(json.dumps([node.get_parameter_or(one).value for one in "xy"]))
 """  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(("named", "given"), ORDERS.values(), ids=ORDERS)
+@pytest.mark.parametrize(("named", "parameters"), ORDERS.values(), ids=ORDERS)
 def test_a_real_node_has_the_parameters_that_it_has_with_launch(
-    named: str, given: list[Any], tmp_path: Path, domain: Domain
+    named: str, parameters: list[Any], tmp_path: Path, domain: Domain
 ) -> None:
     def file_of(name: str, text: str) -> str:
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -367,7 +367,7 @@ def test_a_real_node_has_the_parameters_that_it_has_with_launch(
 
     params = [
         file_of(f"{number}.yaml", arg) if isinstance(arg, str) else arg
-        for number, arg in enumerate(given)
+        for number, arg in enumerate(parameters)
     ]
     text = ORDER.replace("NAMED", named).replace("GIVEN", repr(params))
     file = Path(file_of("a.launch.py", text))

@@ -241,8 +241,8 @@ WORDS = (
 READER = """
 import json, rclpy, sys
 rclpy.init(args=sys.argv[1:])
-given = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
-params = rclpy.create_node("n", **given).get_parameters_by_prefix("p").values()
+options = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
+params = rclpy.create_node("n", **options).get_parameters_by_prefix("p").values()
 values = {one.name: one.value for one in params}
 print(json.dumps({name: list(value) if hasattr(value, "tolist") else value for name, value in values.items()}))
 """  # noqa: E501 (a text as its reader has it)

@@ -74,11 +74,11 @@ def moved(sent: Iterable[Sent], from_s: float, xyz: tuple[float, float, float]) 
 
 def thinned(sent: list[Sent]) -> list[Sent]:
     """Drop every second transform."""
-    return [LASER, *(each for index, each in enumerate(sent[1:]) if index % 2)]
+    return [LASER, *(row for index, row in enumerate(sent[1:]) if index % 2)]
 
 
 def gap(sent: list[Sent], begin_s: float, end_s: float) -> list[Sent]:
-    return [each for each in sent if not begin_s < each[1] < end_s]
+    return [row for row in sent if not begin_s < row[1] < end_s]
 
 
 RATE = "edges: {odom → base_link: {rate: [45 Hz, 55 Hz]}}"
@@ -257,7 +257,7 @@ def test_reports_for_ci_have_each_case_and_the_line_of_the_expectation(
     assert failure.get("type") == "TF931"
     (row,) = json.loads(tfcompose_in(tmp_path, "test", "--format", "json").stdout)
     assert (row["name"], row["line"], row["passed"]) == ("drives", 3, False)
-    assert [each["line"] for each in row["findings"]] == [6]
+    assert [finding["line"] for finding in row["findings"]] == [6]
 
 
 def test_a_failed_case_leaves_a_bag_and_a_picture_of_its_tree(
@@ -270,12 +270,15 @@ def test_a_failed_case_leaves_a_bag_and_a_picture_of_its_tree(
     assert "25.0 Hz" in (folder / "tree.svg").read_text("utf-8")
     pair = ("/tf", "/tf_static")
     kept, replayed = (
-        [(each.received_ns, each.static, each.rows) for each in Recording(str(bag)).messages(pair)]
+        [
+            (message.received_ns, message.static, message.rows)
+            for message in Recording(str(bag)).messages(pair)
+        ]
         for bag in (folder / "tf", tmp_path / "bag")
     )
     assert kept == replayed
     with Reader(folder / "tf") as reader:
-        extras = {each.topic: each.ext for each in reader.connections}
+        extras = {connection.topic: connection.ext for connection in reader.connections}
     profiles = {
         topic: extra.offered_qos_profiles
         for topic, extra in extras.items()

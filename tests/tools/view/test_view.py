@@ -57,8 +57,8 @@ def test_a_moved_mount_is_saved_as_one_line_and_its_comment_stays(
     panel = Panel(server, session, edit=True)
     panel.tree.select("front_link")
     mount = session.mount("front_link")
-    given = mount.pose_in_file(mount.edge.pose)
-    panel.move(Pose((0.5, *given.xyz[1:]), given.quat_xyzw))
+    pose = mount.pose_in_file(mount.edge.pose)
+    panel.move(Pose((0.5, *pose.xyz[1:]), pose.quat_xyzw))
     panel.save()
     after = rover.read_text("utf-8").splitlines()
     changed = [(old, new) for old, new in zip(before, after, strict=True) if old != new]
@@ -94,10 +94,10 @@ def test_the_gizmo_is_where_a_typed_pose_puts_the_mount(
 ) -> None:
     panel = Panel(server, session_of(rover), edit=True)
     panel.tree.select("front_link")
-    given = panel.session.mount("front_link").pose_in_file(
+    pose = panel.session.mount("front_link").pose_in_file(
         panel.session.mount("front_link").edge.pose
     )
-    panel.move(Pose((0.5, 0.1, 0.7), given.quat_xyzw))
+    panel.move(Pose((0.5, 0.1, 0.7), pose.quat_xyzw))
     assert panel.gizmo.position == pytest.approx(panel.poses()["front_link"].xyz)
     assert panel.poses()["front_link"].xyz == pytest.approx((0.5, 0.1, 0.7))
 

@@ -176,7 +176,8 @@ async def _deploy(target: DeployTarget, release: Release | None, arguments: Name
                 print(printable(line))
         changes = rollout.changes()
         if not changes:
-            return _report_unchanged(rollout)
+            waits = target.waits and not arguments.check
+            return await _report_unchanged(rollout, waits=waits)
         if arguments.check:
             print(
                 "\n".join(f"{name}: {line}" for name, lines in changes.items() for line in lines)
@@ -192,12 +193,12 @@ def _report(line: str) -> None:
     print(printable(line), flush=True)
 
 
-def _report_unchanged(rollout: Rollout) -> int:
+async def _report_unchanged(rollout: Rollout, *, waits: bool) -> int:
     """Print that the hosts already run the release, and report edges that are not live.
 
-    Return exit code 1 if there are such edges.
+    Return exit code 1 if there are such edges. With ``waits``, wait for them first.
     """
-    print(f"nothing to change: {rollout.describe()}")
-    findings = rollout.not_live()
+    _report(f"nothing to change: {rollout.describe()}")
+    findings = await rollout.not_live(waits=waits)
     print_findings(findings, sys.stderr)
     return FAILED if findings else 0

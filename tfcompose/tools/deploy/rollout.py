@@ -400,9 +400,21 @@ class Rollout:
     def _waiting(self, seconds: float) -> Callable[[Share], Awaitable[Any]]:
         return lambda share: self._ask(share, "wait", seconds=seconds)
 
-    def not_live(self) -> list[Finding]:
-        """Return findings about edges and processes that ``compare`` did not find live."""
-        return [problem for share in self.shares for problem in self._missing(share, share.state)]
+    async def not_live(self, *, waits: bool) -> list[Finding]:
+        """Return findings about edges and processes that ``compare`` did not find live.
+
+        With ``waits``, hosts that have just booted get the deployment's time for their edges.
+        """
+        findings = [
+            problem for share in self.shares for problem in self._missing(share, share.state)
+        ]
+        if waits and findings and all(share.state["robot"] for share in self.shares):
+            try:
+                await self._until_live(time.monotonic())
+            except RejectedError as error:
+                return list(error.findings)
+            return []
+        return findings
 
     async def plan_return(self) -> None:
         """Make the previous release each host's goal.

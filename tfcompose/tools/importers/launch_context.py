@@ -50,7 +50,7 @@ class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[m
     def here(self) -> tuple[str, int]:
         """Return the file and line being read."""
         place = here()
-        return place if place[0] else self.at
+        return place if place[0] else self.place
 
     @property
     def variables(self) -> dict[str, str]:

@@ -40,7 +40,7 @@ class _FromFile(launch.Substitution):  # type: ignore[misc]
 
     def __init__(self, source_file: Any) -> None:
         super().__init__()
-        self.at, self.source_file = here(), source_file
+        self.place, self.source_file = here(), source_file
 
     def file(self, context: RecordingContext) -> str:
         """Return the path of the file, or a ``package://`` address if its package is not found."""
@@ -58,10 +58,10 @@ class _FromFile(launch.Substitution):  # type: ignore[misc]
             return file
         if file.startswith(PACKAGE):
             texts = ", ".join(f"{key}: {value}" for key, value in changes.items())
-            context.todo(self.at, f"changes in {Path(file).name}: {texts}")
+            context.todo(self.place, f"changes in {Path(file).name}: {texts}")
             return file
         source = file_text(file)
-        return file_of_text(file, source, change(source), self.at, context)
+        return file_of_text(file, source, change(source), self.place, context)
 
 
 def _texts(values: Mapping[str, Any] | None, context: RecordingContext) -> dict[str, str]:

@@ -179,7 +179,7 @@ def visit_all(entities: Any, context: RecordingContext) -> None:
         elif hasattr(entity, "visit"):
             visit_all(entity.visit(context), context)
         elif entity is not None:
-            context.todo(context.at, f"{type(entity).__name__} is not an action")
+            context.todo(context.place, f"{type(entity).__name__} is not an action")
 
 
 def _visit(action: Any, context: RecordingContext) -> None:
@@ -196,7 +196,7 @@ def _if_holds(
 
     If the import reads all branches, call it in any case.
     """
-    place = context.at = place_of(made)
+    place = context.place = place_of(made)
     if condition is None:
         _execute(made, execute, context)
         return

@@ -44,7 +44,7 @@ class LaunchRecording:
         self.find, self.every_branch = find, every_branch
         self.records: list[dict[str, Any]] = []
         #: The file and line that is being read.
-        self.at: tuple[str, int] = ("", 1)
+        self.place: tuple[str, int] = ("", 1)
         self.conditions: list[str] = []
         self.whens: list[str] = []
         self.period_s = 0.0
@@ -59,7 +59,7 @@ class LaunchRecording:
 
     def here(self) -> tuple[str, int]:
         """Return the file and line being read."""
-        return self.at
+        return self.place
 
     def record(self, kind: str, place: Any, **what: Any) -> None:
         """Record an action."""

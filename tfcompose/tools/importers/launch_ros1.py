@@ -156,8 +156,8 @@ def _root(file: str) -> Element:
 
 def _visit(element: Element, recording: Ros1Recording) -> None:
     """Record an element, if its condition is true."""
-    recording.at = (recording.file, element.span.line)
-    place = recording.at
+    recording.place = (recording.file, element.span.line)
+    place = recording.place
     try:
         when, holds = _condition(element, recording)
     except FailedError as error:
@@ -218,7 +218,7 @@ def _read_element(element: Element, recording: Ros1Recording) -> None:
     attributes = _Attributes(element, recording)
     reader(attributes, recording)
     if left := attributes.unread():
-        recording.todo(attributes.at, f"<{element.tag}>: {', '.join(left)}")
+        recording.todo(attributes.place, f"<{element.tag}>: {', '.join(left)}")
 
 
 class _Attributes:
@@ -226,7 +226,7 @@ class _Attributes:
 
     def __init__(self, element: Element, recording: Ros1Recording) -> None:
         self.element, self._recording = element, recording
-        self.at = recording.at
+        self.place = recording.place
         self._read = {"if", "unless", "doc", "clear_params", "pass_all_args"}
         self._inside: set[str] = set()
 
@@ -368,7 +368,7 @@ def _arg(element: _Attributes, recording: Ros1Recording) -> None:
         "choices": [],
         "description": description,
     }
-    recording.record("argument", element.at, name=name, variable="", **what)
+    recording.record("argument", element.place, name=name, variable="", **what)
 
 
 def _param(element: _Attributes, recording: Ros1Recording) -> None:
@@ -412,7 +412,7 @@ def _node(element: _Attributes, recording: Ros1Recording) -> None:
     env = {str(variable.need("name")): variable.need("value") for variable in element.all("env")}
     recording.record(
         "node",
-        element.at,
+        element.place,
         id=next(IDS),
         package=str(element.need("pkg")),
         executable=str(executable if is_of_ros1 else element.need("exec")),
@@ -478,7 +478,7 @@ def _include(element: _Attributes, recording: Ros1Recording) -> None:
     namespace = _below(recording.namespace, element.value("ns"))
     if path.startswith(PACKAGE):
         where = {"file": path, "namespace": namespace, "env": dict(recording.variables)}
-        recording.record("include", element.at, args=kept, period=0.0, after={}, **where)
+        recording.record("include", element.place, args=kept, period=0.0, after={}, **where)
         return
     scope, arguments = recording.scope(), recording.arguments
     declared = recording.declared

@@ -162,7 +162,7 @@ class _ShellReader:
 
     def __init__(self, text: str) -> None:
         self.text = text.replace("\r\n", "\n")
-        self.at, self.line = 0, 1
+        self.offset, self.line = 0, 1
         self.variables: dict[str, str] = {}
 
     def commands(self) -> Iterator[ShellCommand]:
@@ -171,15 +171,15 @@ class _ShellReader:
         A command has the values that its variables have at its line.
         """
         piped = False
-        while self.at < len(self.text):
-            begin, line = self.at, self.line
+        while self.offset < len(self.text):
+            begin, line = self.offset, self.line
             argv, unknown, ended = self._words()
-            body = " ".join(self.text[begin : self.at].rstrip(";&|\n ").split())
+            body = " ".join(self.text[begin : self.offset].rstrip(";&|\n ").split())
             is_piped = piped or ended == "|"
             piped = ended == "|"
             if argv:
-                line += self.text[begin : self.at].count(
-                    "\n", 0, _first_word(self.text[begin : self.at])
+                line += self.text[begin : self.offset].count(
+                    "\n", 0, _first_word(self.text[begin : self.offset])
                 )
                 yield ShellCommand(
                     tuple(argv), body.replace("\\ ", ""), line, tuple(unknown), is_piped
@@ -190,20 +190,24 @@ class _ShellReader:
         argv: list[str] = []
         unknown: list[str] = []
         token: str | None = None
-        while self.at < len(self.text):
-            char = self.text[self.at]
-            if char == "\\" and self.text[self.at + 1 : self.at + 2] == "\n":
+        while self.offset < len(self.text):
+            char = self.text[self.offset]
+            if char == "\\" and self.text[self.offset + 1 : self.offset + 2] == "\n":
                 self._step(2)
             elif char in " \t":
                 argv += [token] if token is not None else []
                 token = None
                 self._step()
             elif char == "#" and token is None:
-                end = self.text.find("\n", self.at)
-                self._step((end if end >= 0 else len(self.text)) - self.at)
+                end = self.text.find("\n", self.offset)
+                self._step((end if end >= 0 else len(self.text)) - self.offset)
             elif char in "\n;&|" and not self._is_redirection():
                 self._step()
-                double = self.at < len(self.text) and self.text[self.at] == char and char in "&|;"
+                double = (
+                    self.offset < len(self.text)
+                    and self.text[self.offset] == char
+                    and char in "&|;"
+                )
                 self._step(1 if double else 0)
                 return (
                     [*argv, *([token] if token is not None else [])],
@@ -219,41 +223,46 @@ class _ShellReader:
 
     def _is_redirection(self) -> bool:
         """Return whether the next ``&`` belongs to ``2>&1`` or ``&>``."""
-        before, behind = self.text[self.at - 1 : self.at], self.text[self.at + 1 : self.at + 2]
-        return self.text[self.at] == "&" and (before in {">", "<"} or behind == ">")
+        before, behind = (
+            self.text[self.offset - 1 : self.offset],
+            self.text[self.offset + 1 : self.offset + 2],
+        )
+        return self.text[self.offset] == "&" and (before in {">", "<"} or behind == ">")
 
     def _piece(self, unknown: list[str]) -> str:
         """Return the next piece of a word: a quoted text, a variable, or a character."""
-        char = self.text[self.at]
+        char = self.text[self.offset]
         if char == "'":
-            end = self.text.find("'", self.at + 1)
+            end = self.text.find("'", self.offset + 1)
             end = end if end >= 0 else len(self.text)
-            piece = self.text[self.at + 1 : end]
-            self._step(end + 1 - self.at)
+            piece = self.text[self.offset + 1 : end]
+            self._step(end + 1 - self.offset)
             return piece
         if char == '"':
             self._step()
             pieces = []
-            while self.at < len(self.text) and self.text[self.at] != '"':
-                if self.text[self.at] == "\\" and self.text[self.at + 1 : self.at + 2] in {
+            while self.offset < len(self.text) and self.text[self.offset] != '"':
+                if self.text[self.offset] == "\\" and self.text[
+                    self.offset + 1 : self.offset + 2
+                ] in {
                     '"',
                     "\\",
                     "$",
                     "`",
                     "\n",
                 }:
-                    escaped = self.text[self.at + 1]
+                    escaped = self.text[self.offset + 1]
                     pieces.append("" if escaped == "\n" else escaped)
                     self._step(2)
-                elif self.text[self.at] in "$`":
+                elif self.text[self.offset] in "$`":
                     pieces.append(self._expansion(unknown))
                 else:
-                    pieces.append(self.text[self.at])
+                    pieces.append(self.text[self.offset])
                     self._step()
             self._step()
             return "".join(pieces)
         if char == "\\":
-            piece = self.text[self.at + 1 : self.at + 2]
+            piece = self.text[self.offset + 1 : self.offset + 2]
             self._step(2)
             return piece
         if char in "$`":
@@ -262,7 +271,7 @@ class _ShellReader:
         return char
 
     def _expansion(self, unknown: list[str]) -> str:
-        rest = self.text[self.at :]
+        rest = self.text[self.offset :]
         if rest[0] == "`":
             end = rest.find("`", 1)
             return self._unknown(end + 1 if end > 0 else len(rest), unknown)
@@ -284,14 +293,14 @@ class _ShellReader:
         return value
 
     def _unknown(self, length: int, unknown: list[str]) -> str:
-        piece = self.text[self.at : self.at + length]
+        piece = self.text[self.offset : self.offset + length]
         self._step(length)
         unknown.append(piece)
         return piece
 
     def _step(self, count: int = 1) -> None:
-        self.line += self.text.count("\n", self.at, self.at + count)
-        self.at += count
+        self.line += self.text.count("\n", self.offset, self.offset + count)
+        self.offset += count
 
 
 def _first_word(text: str) -> int:

@@ -8,6 +8,7 @@ read or written; then there is no bag.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,9 +74,11 @@ def _record(plan: Plan, output: Path, duration_s: float | None) -> None:
     from tfcompose.tools.record.recorder import Recorder  # rclpy reads the environment when loaded
 
     pairs = list(parts_of(plan))
+    end = "Ctrl-C ends it" if duration_s is None else f"for {duration_s:g} s"
+    begun = partial(print, f"recording {output}: {end}", flush=True)
     with Stop() as stop, BagWriter(output) as writer:
         try:
-            with Recorder(writer, pairs, joint_states_topics(plan)) as recorder:
+            with Recorder(writer, pairs, joint_states_topics(plan), begun) as recorder:
                 seconds = follow(recorder, stop, duration_s=duration_s)
                 elsewhere = recorder.elsewhere()
         except RosError as error:

@@ -14,7 +14,7 @@ from tfcompose.tf.ros.sensor_data import JointStateSubscription
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from rclpy.node import Node
     from typing_extensions import Self
@@ -29,12 +29,20 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 
 
 class Recorder:
-    """A feed of pairs of TF topics (moving, fixed), joint states and /clock into a bag."""
+    """A feed of pairs of TF topics (moving, fixed), joint states and /clock into a bag.
+
+    ``begun`` is called when the first transforms are in the bag.
+    """
 
     def __init__(
-        self, writer: BagWriter, pairs: Iterable[Topics], joint_topics: Iterable[str]
+        self,
+        writer: BagWriter,
+        pairs: Iterable[Topics],
+        joint_topics: Iterable[str],
+        begun: Callable[[], None],
     ) -> None:
         self.writer = writer
+        self._begun: Callable[[], None] | None = begun
         self._pairs = tuple(pairs)
         self._joint_topics = tuple(joint_topics)
         self._stack = ExitStack()
@@ -82,6 +90,9 @@ class Recorder:
             for received in source.take():
                 received_ns = received.received_ns or wall_ns()
                 self.writer.write(source.topic, type_, received.data, received_ns, latched=latched)
+        if self._begun and self.received_any:
+            self._begun()
+            self._begun = None
         return True
 
     def elsewhere(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ _NAMED = {
     "D": "left",
     "H": "home",
     "F": "end",
+    "Z": "backtab",
     "1~": "home",
     "4~": "end",
     "7~": "home",
@@ -23,6 +24,7 @@ _NAMED = {
     "\033": "esc",
     "\x7f": "backspace",
     "\b": "backspace",
+    "\t": "tab",
     " ": "pgdn",
     "\f": "redraw",
 }

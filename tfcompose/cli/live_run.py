@@ -306,11 +306,7 @@ class _LiveView:
 
     def _take_signal(self, number: int) -> None:
         if number == signal.SIGTSTP:
-            self._screen.leave()
-            handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
-            os.kill(os.getpid(), signal.SIGTSTP)
-            signal.signal(signal.SIGTSTP, handler)
-            self._screen.enter()
+            self._screen.suspend()
         elif number in ENDING or number == signal.SIGQUIT:
             self._pass_on(signal.SIGTERM if number == signal.SIGQUIT else signal.Signals(number))
         self._stale = True

@@ -6,6 +6,8 @@ If a few rows change 20 times a second, only these rows are sent over a slow lin
 from __future__ import annotations
 
 import contextlib
+import os
+import signal
 import sys
 import termios
 from typing import TYPE_CHECKING
@@ -145,6 +147,14 @@ class Screen:
         self.output.finish()
         with contextlib.suppress(termios.error):
             termios.tcsetattr(self.fd, termios.TCSANOW, self._before)
+
+    def suspend(self) -> None:
+        """Restore the terminal, stop this process as Ctrl-Z does, and come back with it."""
+        self.leave()
+        handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGTSTP)
+        signal.signal(signal.SIGTSTP, handler)
+        self.enter()
 
     def draw(self, rows: Callable[[int, int], list[str]]) -> bool:
         """Draw the rows for the current size. Return False if the terminal is still busy.

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 #: The values of a pose, in the order of xyz and rpy.
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-_ANGLES = frozenset({"roll", "pitch", "yaw"})
+#: The angles among them.
+ANGLES = frozenset({"roll", "pitch", "yaw"})
 _SIGNS = "+-−"
 
 
@@ -46,7 +47,7 @@ def change_of(axis: str, text: str) -> PoseChange:
     Raises:
         ChangeError: if it is neither, or has no unit.
     """
-    dimension = ANGLE if axis in _ANGLES else LENGTH
+    dimension = ANGLE if axis in ANGLES else LENGTH
     sign, number = text.strip()[:1], text.strip().removeprefix("=")
     if not sign or sign not in f"{_SIGNS}=":
         raise ChangeError(
@@ -78,7 +79,7 @@ def change_pose(pose: Pose, changes: Sequence[PoseChange], *, local: bool) -> Po
     if replaced:
         x, y, z, roll, pitch, yaw = (values | replaced).values()
         # Unchanged angles are kept to the last bit.
-        quat = quat_from_rpy(roll, pitch, yaw) if replaced.keys() & _ANGLES else pose.quat_xyzw
+        quat = quat_from_rpy(roll, pitch, yaw) if replaced.keys() & ANGLES else pose.quat_xyzw
         pose = Pose((x, y, z), quat)
     added = {change.axis: change.value for change in changes if change.relative}
     x, y, z, roll, pitch, yaw = (added.get(axis, 0.0) for axis in AXES)

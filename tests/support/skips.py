@@ -35,6 +35,7 @@ NEEDS_STOCK_ROS = {
     "tests/tools/ros2/test_init_package_ros.py": (
         "colcon and the ros2 command come with a distribution only"
     ),
+    "tests/tools/adjust/test_nudge_stock_ros.py": "there is no robot_state_publisher",
     "tests/tools/ros2/test_launch_ros.py": "ros2 launch comes with a distribution only",
     "tests/guard/test_plan_parameters_ros.py::test_ros2_param_reads_them": (
         "ros2 param comes with a distribution only; clients of rclpy read the same"

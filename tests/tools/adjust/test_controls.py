@@ -50,7 +50,8 @@ def controls(*keys: str) -> Controls:
 )
 def test_keys_mean_steps_and_a_held_key_is_one_step(keys: list[str], steps: list[Step]) -> None:
     taken = controls(*keys).take_steps()
-    assert [replace(step, value=pytest.approx(step.value)) for step in steps] == taken
+    assert [replace(step, value=0) for step in taken] == [replace(step, value=0) for step in steps]
+    assert [step.value for step in taken] == pytest.approx([step.value for step in steps])
 
 
 def test_steps_that_cancel_out_and_an_undo_of_nothing_change_no_edge() -> None:

@@ -77,7 +77,7 @@ ONLY_IN: dict[str, set[str]] = {
     "resvg_py": {"compiler.draw"},
     "font_lato": {"compiler.draw"},
     "argcomplete": {"cli"},
-    "msgspec": {"cli", "guard", "launcher", "model", "tools.exporters"},
+    "msgspec": {"cli", "guard", "launcher", "model", "tools.exporters", "tools.treetest"},
     "regex": {"launcher"},
     "rich": {"cli"},
     "pytest": {"tools.treetest"},  # of a plug-in, which pytest loads

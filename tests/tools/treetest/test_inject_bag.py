@@ -9,7 +9,7 @@ from tests.support.cli import tfcompose_in
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.bags import Recording
 from tfcompose.tools.treetest.cases import Case, CaseLoader
-from tfcompose.tools.treetest.inject_bag import inject
+from tfcompose.tools.treetest.faults import inject
 from tfcompose.tools.treetest.running import run_case
 
 ROBOT = """\
@@ -149,12 +149,3 @@ def test_a_wrong_injection_is_refused(injection: str, code: str, folder: Path) -
     assert done.returncode == 2
     assert f"error[{code}]" in done.stderr, done.stderr
     assert "cart.test.yaml:6:" in done.stderr
-
-
-def test_a_fault_in_messages_is_refused_without_a_recording(folder: Path) -> None:
-    text = "robot: robot.yaml\ncases:\n  - name: drives\n    expect: {complete: 1 s}\n"
-    text += "    inject: [{clock: odom → base_link}]\n"
-    (folder / "cart.test.yaml").write_text(text, "utf-8")
-    done = tfcompose_in(folder, "test")
-    assert done.returncode == 2
-    assert "cart.test.yaml:5:22: error[TF106]" in done.stderr, done.stderr

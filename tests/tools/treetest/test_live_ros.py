@@ -32,6 +32,7 @@ processes:
   drive: {simulate: {circle: {radius: 1 m, speed: 0.5 rad/s}, rate: 50 Hz}}
 profiles:
   broken: {processes: {wheels: {run: [sh, -c, "echo no wheels; exit 3"], required: true}}}
+  strict: {guard: {mode: strict, fence: remap}}
 """
 MET = """\
   - name: drives
@@ -52,6 +53,26 @@ HANGING = """\
     for: 1 s
     inject: {stop: drive}
     expect: {findings: [{code: TF804, names: drive, within: 10 s}]}
+"""
+#: Faults in messages, which relays inject.
+RELAYED = """\
+  - name: another clock and a moving fixed edge
+    for: 1 s
+    inject: [{clock: odom → base_link}, {dynamic: {edge: base_link → laser}}]
+    expect:
+      edges: {odom → base_link: {owner: drive}, base_link → laser: {owner: static}}
+      findings:
+        - {code: TF825, names: [/drive, odom → base_link]}
+        - {code: TF809, names: [/tfcompose_static, base_link → laser]}
+  - name: a jump behind a strict guard
+    profile: strict
+    for: 1 s
+    inject: {jump: {edge: base_link → laser, xyz: [0, 0, 2 mm]}, at: 300 ms}
+    expect: {findings: [{code: TF846, names: laser}]}
+  - name: no messages
+    for: 1 s
+    inject: {drop: {edge: odom → base_link}}
+    expect: {findings: [{code: TF804, names: [/drive, odom → base_link], within: 10 s}]}
 """
 UNMET = """\
   - name: a second odometry
@@ -99,6 +120,12 @@ def test_met_expectations_pass_in_parallel_and_leave_nothing(tmp_path: Path) -> 
     assert done.stdout.splitlines()[-1] == "3 cases, 0 failed"
     assert not list((tmp_path / "kept").iterdir())
     assert not (tmp_path / "build").exists()
+
+
+def test_faults_in_messages_of_a_started_robot_are_named(tmp_path: Path) -> None:
+    write(tmp_path, RELAYED)
+    done = tfcompose_in(tmp_path, "test", "-j", "3")
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_unmet_expectations_fail_at_their_lines_and_leave_evidence(

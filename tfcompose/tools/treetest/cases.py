@@ -18,10 +18,11 @@ from tfcompose.spec.load import find_path, load
 from tfcompose.tf.bags import BagError, Recording
 from tfcompose.tools.treetest import ENDINGS
 from tfcompose.tools.treetest.injections import split_pair
+from tfcompose.tools.treetest.relayed_plan import find_obstacles
 from tfcompose.tools.treetest.spec import SuiteSpec, validate_suite
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from datetime import date
 
     from tfcompose.foundation.findings import Finding, Span
@@ -38,6 +39,8 @@ class Case:
 
     spec: CaseSpec
     source: Source
+    #: The text of the test file.
+    text: str
     #: Where the case is in its file.
     path: SpecPath
     plan: Plan
@@ -92,20 +95,21 @@ class CaseLoader:
         Raises:
             RejectedError: with every finding about it, its robot and its recordings.
         """
-        source = load(read_text(file), file, SuiteSpec.BEGIN)
+        text = read_text(file)
+        source = load(text, file, SuiteSpec.BEGIN)
         suite = validate_suite(source)
         cases: list[Case] = []
         findings: list[Finding] = []
         for index in range(len(suite.cases)):
             try:
-                cases.append(self._case(suite, index, source))
+                cases.append(self._case(suite, index, source, text))
             except RejectedError as error:
                 findings += error.findings
         if findings:
             raise RejectedError(dict.fromkeys(findings))
         return cases
 
-    def _case(self, suite: SuiteSpec, index: int, source: Source) -> Case:
+    def _case(self, suite: SuiteSpec, index: int, source: Source, text: str) -> Case:
         spec, path = suite.cases[index], ("cases", index)
         bag, day = None, None
         if spec.bag is not None:
@@ -116,7 +120,15 @@ class CaseLoader:
         robot = find_path(suite.robot, source.span_of(("robot",)))
         plan = self._plan(robot, spec.profile, day, starts=bag is None)
         case = Case(
-            spec, source, path, plan=plan, robot=robot, bag=bag, trust=self.trust, golden=golden
+            spec,
+            source,
+            text,
+            path,
+            plan=plan,
+            robot=robot,
+            bag=bag,
+            trust=self.trust,
+            golden=golden,
         )
         findings = list(check_names(case))
         if findings:
@@ -133,19 +145,27 @@ class CaseLoader:
         """
         key = (robot, profiles, day, starts)
         if key not in self._plans:
-            arguments = Namespace(
-                profiles=list(profiles),
-                overlays=[],
-                settings=[],
-                arg_values={},
-                trust=self.trust,
-                by_hostname=starts,
-            )
+            arguments = variant_of(profiles, trust=self.trust, starts=starts)
             compiled = compile_file(robot, arguments, day)
             if compiled.robot is None or compiled.errors:
                 raise RejectedError(compiled.errors)
             self._plans[key] = plan_of(compiled.robot.with_final_names())
         return self._plans[key]
+
+
+def variant_of(profiles: Iterable[str], *, trust: bool, starts: bool) -> Namespace:
+    """Return the arguments with which a robot file is compiled.
+
+    ``trust``: xacro files may run outside of the sandbox. ``starts``: the robot is started here.
+    """
+    return Namespace(
+        profiles=list(profiles),
+        overlays=[],
+        settings=[],
+        arg_values={},
+        trust=trust,
+        by_hostname=starts,
+    )
 
 
 def _recording(name: str, span: Span) -> tuple[str, date | None]:
@@ -214,6 +234,13 @@ def _check_injection(case: Case, injection: InjectionSpec, at: SpecPath) -> Iter
         advice = did_you_mean(injection.joint.name, joints)
         yield _unknown(case, span, f"moving joint {injection.joint.name}", advice)
     pair = injection.edge
+    if case.bag is None:
+        for obstacle, advice in find_obstacles(injection, plan):
+            span = case.value_span(*at, injection.kind or "")
+            message = f"{injection.kind} cannot be injected: {obstacle}"
+            yield finding(
+                "TF932", message, span, help=f"{advice}, or inject it into a recording: bag:"
+            )
     kinds = {(edge.parent, edge.child): edge.kind for edge in plan.edges}
     if pair is None:
         return

@@ -9,13 +9,15 @@ import subprocess
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Protocol
 
+from tfcompose.foundation.text import list_names
 from tfcompose.launcher.child import kill_group
 from tfcompose.launcher.control import RequestRefusedError, ask
 from tfcompose.launcher.runtime_dir import RuntimeDirError, runtime_dir_of
 from tfcompose.model.messages import RobotStatus, StatusRequest
-from tfcompose.tools.treetest.inject_bag import topics_of
+from tfcompose.tools.treetest.faults import topics_of
 from tfcompose.tools.treetest.injections import split_pair
-from tfcompose.tools.treetest.running import end_process, own_command
+from tfcompose.tools.treetest.processes import end_process, own_command
+from tfcompose.tools.treetest.relayed_plan import relayed_processes
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
     from tfcompose.tools.treetest.cases import Case
     from tfcompose.tools.treetest.injections import InjectionSpec, PublishSpec
+    from tfcompose.tools.treetest.setup import LiveSetup
 
 #: Time for an injection to begin once it is due, and for its process to end, in seconds.
 BEGIN_S, END_S = 30.0, 10.0
@@ -57,8 +60,11 @@ class LiveFault(Protocol):
 class Injections:
     """The injections of a case: prepared, begun when due, and ended with the ``with`` block."""
 
-    def __init__(self, case: Case) -> None:
-        self._faults = [(each.at or 0.0, _fault_of(each, case.plan)) for each in case.spec.inject]
+    def __init__(self, case: Case, setup: LiveSetup) -> None:
+        self._faults = [
+            (each.at or 0.0, _fault_of(number, each, case.plan, setup))
+            for number, each in enumerate(case.spec.inject)
+        ]
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:
@@ -85,12 +91,39 @@ class Injections:
         return all(fault.has_begun for _, fault in self._faults)
 
 
-def _fault_of(injection: InjectionSpec, plan: Plan) -> LiveFault:
+def _fault_of(number: int, injection: InjectionSpec, plan: Plan, setup: LiveSetup) -> LiveFault:
     if injection.publish is not None:
         return PublisherProcess(injection.publish, plan)
     if injection.kill is not None:
         return ProcessSignal(injection.kill, signal.SIGKILL, plan)
-    return ProcessSignal(injection.stop or "", signal.SIGSTOP, plan)
+    if injection.stop is not None:
+        return ProcessSignal(injection.stop, signal.SIGSTOP, plan)
+    return RelayedFault(number, injection, plan, setup)
+
+
+class RelayedFault:
+    """A fault in messages, injected by the relays of processes."""
+
+    def __init__(
+        self, number: int, injection: InjectionSpec, plan: Plan, setup: LiveSetup
+    ) -> None:
+        processes = relayed_processes(injection, plan)
+        self.text = f"{injection.kind} in the messages of {list_names(processes)}"
+        self.has_begun = False
+        self._begin = setup.begin_file(number)
+        self._begun = [setup.begun_file(number, process) for process in processes]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for file in (self._begin, *self._begun):
+            file.unlink(missing_ok=True)
+
+    def begin(self) -> None:
+        """Ask the relays to begin, and update ``has_begun``."""
+        self._begin.touch()
+        self.has_begun = all(file.exists() for file in self._begun)
 
 
 class ProcessSignal:

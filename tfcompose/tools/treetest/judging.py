@@ -18,8 +18,8 @@ from tfcompose.guard.verdict.verify import verify
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tf.bags import BagError, BagFeed
 from tfcompose.tf.live.feed import follow
+from tfcompose.tools.treetest.faults import inject
 from tfcompose.tools.treetest.golden import GoldenProbe, judge_likeness, read_golden
-from tfcompose.tools.treetest.inject_bag import inject
 from tfcompose.tools.treetest.injections import split_pair
 from tfcompose.tools.treetest.joints import (
     JointProbe,

@@ -8,29 +8,36 @@ from __future__ import annotations
 
 import contextlib
 import os
-import pickle
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.build_process import BuildProcess
 from tfcompose.foundation.findings import finding
 from tfcompose.foundation.signals import Stop
 from tfcompose.launcher.child import end_with
 from tfcompose.launcher.program import HERE
+from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.model.plan.topics import joint_states_topics
 from tfcompose.tf.ros.environment import RosError, child_environment, ros_trouble
+from tfcompose.tools.treetest.cases import variant_of
 from tfcompose.tools.treetest.inject_live import InjectionError, Injections
 from tfcompose.tools.treetest.judging import CaseJudge
-from tfcompose.tools.treetest.running import LiveSetup, end_process, not_judged
+from tfcompose.tools.treetest.processes import end_process
+from tfcompose.tools.treetest.relayed_plan import with_relays
+from tfcompose.tools.treetest.running import not_judged
+from tfcompose.tools.treetest.setup import LiveSetup
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.tf.live.ros_feed import RosFeed
+    from tfcompose.tools.treetest.cases import Case
 
 #: Time until the first transform, and from it until the tree is complete, in seconds; a tree that
 #: is not complete by then is judged as it is.
@@ -49,22 +56,23 @@ _LINES = 10
 
 def main() -> int:
     """Run the case of the setup file that the command line names; return the exit code."""
-    setup: LiveSetup = pickle.loads(Path(sys.argv[1]).read_bytes())  # noqa: S301 (of our own process)
+    setup = LiveSetup.read(sys.argv[1])
     end_with(setup.parent, signal.SIGTERM)
     with Stop() as stop:
         findings = judge_live(setup, stop)
-    setup.result.write_bytes(pickle.dumps(findings))
+    setup.write_findings(findings)
     return 0
 
 
 def judge_live(setup: LiveSetup, stop: Stop) -> list[Finding]:
     """Start the case's robot, and return a finding for each expectation that it does not meet."""
     case = setup.case
+    folder = Path(setup.folder)
     os.environ.update(child_environment(os.environ, case.plan.ros, is_built_in=True))
     span = case.value_span("name")
     if trouble := ros_trouble(os.environ, case.plan.ros):
         return [finding(trouble.code, trouble.message, span, help=trouble.help)]
-    with StartedRobot(setup) as robot, Injections(case) as injections:
+    with StartedRobot(case, setup) as robot, Injections(case, setup) as injections:
         from tfcompose.tf.live.ros_feed import RosFeed  # noqa: PLC0415 (rclpy reads the environment)
 
         judge = CaseJudge(case, case.spec.for_, keeps=setup.keeps)
@@ -77,7 +85,7 @@ def judge_live(setup: LiveSetup, stop: Stop) -> list[Finding]:
         except InjectionError as error:
             return [not_judged(case, str(error))]
     if findings and not stop.requested:
-        judge.write_evidence(setup.folder)
+        judge.write_evidence(folder)
     return findings
 
 
@@ -87,24 +95,21 @@ class StartedRobot:
     It also ends if this process does: ``up`` stops when the reader of its events is gone.
     """
 
-    def __init__(self, setup: LiveSetup) -> None:
+    def __init__(self, case: Case, setup: LiveSetup) -> None:
+        self._case = case
         self._setup = setup
-        self._log = setup.folder / "up.log"
+        self._folder = Path(setup.folder)
+        self._log = self._folder / "up.log"
 
     def __enter__(self) -> Self:
-        setup, case = self._setup, self._setup.case
-        events = setup.folder / "events"
+        plan = self._build()
+        events = self._folder / "events"
         os.mkfifo(events, 0o600)
         self._events = os.open(events, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         options = ["--no-live", "--settle", "0", "--events", str(events)]
-        options += ["--output", str(setup.folder / "build")]
-        options += [f"--profile={profile}" for profile in case.spec.profile]
-        options += [f"--set={setting}" for setting in setup.settings]
-        if case.trust:
-            options.append("--trust")
         with self._log.open("wb") as log:
             self._process = subprocess.Popen(
-                [*HERE, "up", case.robot, *options],
+                [*HERE, "up", str(plan), *options],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
@@ -112,10 +117,26 @@ class StartedRobot:
             )
         return self
 
+    def _build(self) -> Path:
+        """Build the robot, with relays for the case's faults; return the file of its plan.
+
+        Raises:
+            SystemExit: if it cannot be built; the reason is printed.
+        """
+        case = self._case
+        arguments = variant_of(case.spec.profile, trust=case.trust, starts=True)
+        arguments.file, arguments.output = case.robot, str(self._folder / "build")
+        with BuildProcess(arguments) as build:
+            file, _ = build.wait_until_built()
+        plan = replace(read_plan(file.read_text("utf-8"), str(file)), ros=case.plan.ros)
+        plan = with_relays(plan, case.spec.inject, self._setup.path)
+        file.write_text(write_plan(plan), "utf-8")
+        return file
+
     def __exit__(self, *_: object) -> None:
         end_process(self._process, signal.SIGINT, _END_S)
         os.close(self._events)
-        (self._setup.folder / "events").unlink()
+        (self._folder / "events").unlink()
 
     def exit_code(self) -> int | None:
         """Return the exit code of ``up``; None: the robot runs."""

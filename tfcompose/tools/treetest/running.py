@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import os
-import pickle
 import re
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +18,8 @@ from tfcompose.launcher.program import without_current_folder
 from tfcompose.tf.ros.domains import DOMAINS, reserve_domain
 from tfcompose.tf.ros.environment import DOMAIN, RANGE, RosError, no_ros
 from tfcompose.tools.treetest.judging import CaseResult, judge_recording
+from tfcompose.tools.treetest.processes import end_process, own_command
+from tfcompose.tools.treetest.setup import LiveSetup
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,37 +36,6 @@ _END_S = 60.0
 _REACHING_OUT = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOCALHOST_ONLY")
 #: Maximum number of printed lines of a process that failed.
 _LINES = 10
-
-
-@dataclass(frozen=True, slots=True)
-class LiveSetup:
-    """What a case's process is given."""
-
-    #: Its plan has the reserved ROS domain.
-    case: Case
-    #: Settings with which ``up`` gets that domain from the robot file.
-    settings: tuple[str, ...]
-    #: For its files and those of the robot.
-    folder: Path
-    #: The process that it ends with.
-    parent: int
-    #: Whether to leave files for inspection there.
-    keeps: bool
-
-    @property
-    def file(self) -> Path:
-        """The file with this, pickled."""
-        return self.folder / "setup"
-
-    @property
-    def result(self) -> Path:
-        """The file with the pickled findings."""
-        return self.folder / "result"
-
-    @property
-    def errors(self) -> Path:
-        """The file with what the process prints."""
-        return self.folder / "judge.log"
 
 
 def run_case(case: Case, stop: Stop, keep: Path | None = None) -> CaseResult:
@@ -117,7 +86,7 @@ def _run_live(case: Case, folder: Path, stop: Stop, *, keeps: bool) -> list[Find
         except RosError as error:
             return [not_judged(case, str(error))]
         runtime = stack.enter_context(tempfile.TemporaryDirectory(prefix="tfcompose-test-"))
-        setup = _setup_of(case, domain, folder, keeps=keeps)
+        setup = LiveSetup.of(_in_domain(case, domain), folder, os.getpid(), keeps=keeps)
         env = {name: value for name, value in os.environ.items() if name not in _REACHING_OUT}
         env |= {
             DOMAIN: str(domain),
@@ -131,31 +100,24 @@ def _run_live(case: Case, folder: Path, stop: Stop, *, keeps: bool) -> list[Find
     if code:
         lines = setup.errors.read_text("utf-8", errors="replace").splitlines()[-_LINES:]
         return [not_judged(case, f"the process of the case ended with {code}", *lines)]
-    findings: list[Finding] = pickle.loads(setup.result.read_bytes())  # noqa: S301 (of our own process)
-    for path in (setup.file, setup.result, setup.errors):
+    findings = setup.read_findings()
+    for path in (setup.path, setup.result, setup.errors):
         path.unlink()
     return findings
 
 
-def _setup_of(case: Case, domain: int, folder: Path, *, keeps: bool) -> LiveSetup:
-    """Return the setup of a case in a domain, whatever its robot file sets."""
-    file_ros = case.plan.ros
-    settings: list[str] = []
-    if file_ros.domain_id is not None:
-        settings.append(f"ros.domain_id={domain}")
-    if file_ros.discovery not in {None, "localhost"}:
-        settings.append("ros.discovery=localhost")
-    ros = replace(file_ros, domain_id=domain, discovery="localhost")
-    case = replace(case, plan=replace(case.plan, ros=ros))
-    return LiveSetup(case, tuple(settings), folder, os.getpid(), keeps=keeps)
+def _in_domain(case: Case, domain: int) -> Case:
+    """Return the case in a ROS domain on this machine, whatever its robot file sets."""
+    ros = replace(case.plan.ros, domain_id=domain, discovery="localhost")
+    return replace(case, plan=replace(case.plan, ros=ros))
 
 
 def _run_process(setup: LiveSetup, env: dict[str, str], stop: Stop) -> int:
     """Run a case's process, or end it if ``stop`` is requested, and return its exit code."""
-    setup.file.write_bytes(pickle.dumps(setup))
+    setup.write()
     with setup.errors.open("wb") as errors:
         process = subprocess.Popen(
-            [*own_command("tfcompose.tools.treetest.live_case"), str(setup.file)],
+            [*own_command("tfcompose.tools.treetest.live_case"), str(setup.path)],
             stdin=subprocess.DEVNULL,
             stdout=errors,
             stderr=errors,
@@ -165,25 +127,6 @@ def _run_process(setup: LiveSetup, env: dict[str, str], stop: Stop) -> int:
     while process.poll() is None and not stop.wait(_CHECK_EVERY_S):
         pass
     return end_process(process, signal.SIGTERM, _END_S)
-
-
-def end_process(process: subprocess.Popen[bytes], number: int, timeout_s: float) -> int:
-    """End a process by a signal if it runs, or kill it after a time; return its exit code."""
-    if process.poll() is None:
-        process.send_signal(number)
-    try:
-        return process.wait(timeout_s)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        return process.wait()
-
-
-def own_command(module: str) -> list[str]:
-    """Return the command that runs a module's ``main``, and imports nothing from this folder."""
-    package = str(Path(__file__).absolute().parents[3])
-    path = f"sys.path[:] = [*filter(None, sys.path), {package!r}]"
-    code = f"import sys; {path}; from {module} import main; sys.exit(main())"
-    return [sys.executable, "-c", code]
 
 
 def not_judged(case: Case, reason: str, *lines: str) -> Finding:

@@ -251,21 +251,13 @@ def _check_suite(suite: SuiteSpec) -> Iterator[SpecRefusal]:
                 yield SpecRefusal("TF106", at, message, "add xyz:, or a rotation such as rpy:")
 
 
-#: Faults that a started robot can have; a recording can have all.
-_LIVE = ("publish", "kill", "stop")
-
-
 def _check_injections(case: CaseSpec, path: Path) -> Iterator[SpecRefusal]:
-    """Yield a refusal for each injection without a fault, or with one that needs a recording."""
+    """Yield a refusal for each injection without a fault."""
     for index, injection in enumerate(case.inject):
         place = (*path, "inject", index)
         if injection.kind is None:
             advice = f"add {', '.join(KINDS)}"
             yield SpecRefusal("TF106", place, "the injection has no fault", advice)
-        elif case.bag is None and injection.kind not in _LIVE:
-            message = f"{injection.kind} changes recorded messages, and the case has no recording"
-            advice = f"add bag:, or use {', '.join(_LIVE)}"
-            yield SpecRefusal("TF106", (*place, injection.kind), message, advice)
 
 
 def _check_bag_case(case: CaseSpec, path: Path) -> Iterator[SpecRefusal]:

@@ -1,8 +1,8 @@
-"""Injection of faults into recorded messages, while they are read.
+"""Injection of faults into messages, while they are read from a recording or relayed.
 
 A fault takes one message after another and returns what arrives instead, at the same time or
-later. ``inject`` puts these in order again. Nothing here reads a file or a clock, and the same
-messages with the same faults give the same result.
+later. An ``Injector`` puts these in order again. Nothing here reads a file or a clock, and the
+same messages with the same faults give the same result.
 """
 
 from __future__ import annotations
@@ -47,29 +47,52 @@ _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 def inject(
     messages: Iterable[RecordedMessage], injections: Sequence[InjectionSpec], plan: Plan
 ) -> Iterator[RecordedMessage]:
-    """Yield the messages with the faults of all injections, in the order of their arrival."""
-    for injection in injections:
-        messages = _inject_fault(messages, injection, plan)
-    yield from messages
+    """Yield the messages with the faults of all injections, in the order of their arrival.
 
-
-def _inject_fault(
-    messages: Iterable[RecordedMessage], injection: InjectionSpec, plan: Plan
-) -> Iterator[RecordedMessage]:
-    """Yield the messages with one fault, in the order of their arrival."""
-    fault = fault_of(injection, plan)
-    begin_ns: int | None = None
-    waiting: list[tuple[int, int, RecordedMessage]] = []
-    numbers = count()
+    What is delayed beyond the recording's end was not recorded.
+    """
+    injectors = [Injector(fault_of(injection, plan)) for injection in injections]
+    is_begun = False
     for message in messages:
-        if begin_ns is None:
-            begin_ns = message.received_ns + round((injection.at or 0.0) * _SECOND_NS)
-        changed = fault(message) if message.received_ns >= begin_ns else (message,)
-        for each in changed:
-            heapq.heappush(waiting, (each.received_ns, next(numbers), each))
-        while waiting and waiting[0][0] <= message.received_ns:
-            yield heapq.heappop(waiting)[2]
-    # What is delayed beyond the recording's end was not recorded.
+        if not is_begun:
+            is_begun = True
+            for injector, injection in zip(injectors, injections, strict=True):
+                injector.begin_ns = message.received_ns + round((injection.at or 0) * _SECOND_NS)
+        yield from pass_through(injectors, message)
+
+
+class Injector:
+    """Injects a fault from a time on, and keeps the order of arrivals."""
+
+    def __init__(self, fault: Fault) -> None:
+        #: The arrival from which on messages are faulty, in nanoseconds; None: none is yet.
+        self.begin_ns: int | None = None
+        self._fault = fault
+        self._waiting: list[tuple[int, int, RecordedMessage]] = []
+        self._numbers = count()
+
+    def take(self, message: RecordedMessage) -> None:
+        """Take a message, not earlier than those before. One without transforms passes time."""
+        is_faulty = self.begin_ns is not None and message.received_ns >= self.begin_ns
+        for changed in self._fault(message) if is_faulty else (message,):
+            heapq.heappush(self._waiting, (changed.received_ns, next(self._numbers), changed))
+
+    def until(self, time_ns: int) -> Iterator[RecordedMessage]:
+        """Yield what has arrived by a time, in nanoseconds."""
+        while self._waiting and self._waiting[0][0] <= time_ns:
+            yield heapq.heappop(self._waiting)[2]
+
+
+def pass_through(
+    injectors: Iterable[Injector], message: RecordedMessage
+) -> Sequence[RecordedMessage]:
+    """Return what arrives, by the time of a message, after it has passed the injectors."""
+    messages: Sequence[RecordedMessage] = [message]
+    for injector in injectors:
+        for each in messages:
+            injector.take(each)
+        messages = list(injector.until(message.received_ns))
+    return messages
 
 
 def fault_of(injection: InjectionSpec, plan: Plan) -> Fault:
@@ -101,13 +124,13 @@ def fault_of(injection: InjectionSpec, plan: Plan) -> Fault:
 
 
 def _changing(change: ChangeRow) -> Fault:
-    """Return the fault that changes each transform, and drops messages without any."""
+    """Return the fault that changes each transform, and drops messages that lose all."""
 
     def take(message: RecordedMessage) -> Iterable[RecordedMessage]:
         if message.rows is None:
             return (message,)
         rows = [row for old in message.rows if (row := change(old, message)) is not None]
-        return (replace(message, rows=tuple(rows)),) if rows else ()
+        return (replace(message, rows=tuple(rows)),) if rows or not message.rows else ()
 
     return take
 
@@ -240,7 +263,7 @@ def split_rows(
     message: RecordedMessage, pair: tuple[str, str]
 ) -> tuple[list[RecordedMessage], list[RecordedMessage]]:
     """Return the message without an edge, and with that alone; each list may be empty."""
-    if message.rows is None:
+    if not message.rows:
         return [message], []
     parts = ([], [])  # type: tuple[list[Row], list[Row]]
     for row in message.rows:

@@ -152,6 +152,26 @@ def test_a_lookup_waits_for_its_timeout(timeout: str, late: list[str], judge: Ju
     assert [head.split(" at ", 1)[1].split(" s", 1)[0] for head in heads] == late
 
 
+@pytest.mark.parametrize(
+    ("laser_s", "times", "late"),
+    [
+        (0.5, "[0.1 s, 1 s, 2 s]", []),
+        (1.8, "[0.5 s, 1 s, 2 s]", ["0.5"]),
+        (0.5, "[1 s, 9 s]", ["9"]),
+    ],
+)
+def test_a_lookup_through_fixed_edges_needs_no_message_at_its_time(
+    laser_s: float, times: str, late: list[str], judge: Judge
+) -> None:
+    """The last message comes at 3 s."""
+    lamp: Sent = ("/tf_static", 0.0, "base_link", "lamp", 0.0, (0.0, 0.0, 0.0), UP)
+    sent = [lamp, *later([LASER], laser_s), *later([lamp], 3.0)]
+    done = judge(f"lookups:\n  - {{from: base_link, to: laser, at: {times}}}", sent)
+    assert done.returncode == bool(late), done.stdout + done.stderr
+    heads = [line for line in done.stdout.splitlines() if "error[TF931]" in line]
+    assert [head.split(" at ", 1)[1].split(" s", 1)[0] for head in heads] == late
+
+
 def test_findings_match_by_code_and_by_names_in_full(judge: Judge) -> None:
     sent = [*DRIVE, ("/tf", 1.0, "base_link", "arm", 1.0, (0.0, 0.0, 0.0), UP)]
     done = judge("findings:\n  - {code: undeclared_edge, names: arm}", sent)

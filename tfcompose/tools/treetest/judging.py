@@ -112,6 +112,7 @@ class CaseJudge:
             yield from self._judge_completeness(expect.complete)
         for pair, pose in self._poses.items():
             yield from self._judge_pose(pair, pose)
+        self._pass_time()
         for (index, position), lookup in self._lookups.items():
             yield from self._judge_lookup(index, position, lookup)
         for pair, joint in self._joints.items():
@@ -147,8 +148,15 @@ class CaseJudge:
 
     def are_lookups_decided(self) -> bool:
         """Return whether every lookup succeeded or is too late."""
-        elapsed_s = self.elapsed_s() or 0.0
+        elapsed_s = self._pass_time()
         return all(lookup.is_decided(elapsed_s) for lookup in self._lookups.values())
+
+    def _pass_time(self) -> float:
+        """Tell the lookups the time since the first transform, and return it."""
+        elapsed_s = self.elapsed_s() or 0.0
+        for lookup in self._lookups.values():
+            lookup.pass_time(elapsed_s)
+        return elapsed_s
 
     def note_reports(self) -> bool:
         """Note the expected findings that are reported now; return whether each one was."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING, Protocol
@@ -207,6 +208,8 @@ class LookupProbe:
     #: Why the last attempt failed.
     failure: str = "the observation ends before that time"
     _stamp_ns: int | None = None
+    #: When fixed edges first connected the two frames; None: they did not.
+    _fixed_s: float | None = None
 
     def is_decided(self, elapsed_s: float) -> bool:
         """Return whether later messages change nothing."""
@@ -214,8 +217,11 @@ class LookupProbe:
 
     def take(self, arrival: Arrival) -> None:
         """Try the lookup, if it is due."""
+        if arrival.static:
+            self._note_fixed(arrival)
+            return
         late_s = arrival.elapsed_s - self.at_s
-        if self.success_s is not None or arrival.static or late_s < 0:
+        if self.success_s is not None or late_s < 0:
             return
         if self._stamp_ns is None:
             self._stamp_ns = arrival.clock_ns - round(late_s * SECOND_NS)
@@ -230,3 +236,23 @@ class LookupProbe:
             self.success_s = arrival.elapsed_s
         else:
             self.failure = f"transforms arrived {late_s:.3g} s late"
+
+    def pass_time(self, elapsed_s: float) -> None:
+        """Note that this time is reached: a lookup through fixed edges needs no message then."""
+        fixed_s = self._fixed_s
+        if self.success_s is not None or elapsed_s < self.at_s:
+            return
+        if fixed_s is None:
+            if self._stamp_ns is None:
+                self.failure = "fixed edges do not connect them, and no moving edge came since"
+        elif fixed_s <= self.at_s + self.timeout_s:
+            self.success_s = max(self.at_s, fixed_s)
+        else:
+            self.failure = f"transforms arrived {fixed_s - self.at_s:.3g} s late"
+
+    def _note_fixed(self, arrival: Arrival) -> None:
+        if self._fixed_s is None:
+            with suppress(TransformException):
+                chain = arrival.buffer.chain_for_all_times(self.target, self.source)
+                if chain is not None and not chain.moving:
+                    self._fixed_s = arrival.elapsed_s

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import fcntl
 import os
@@ -44,6 +45,9 @@ class Shell:
 
     def __init__(self, folder: Path, shell: str = "bash", **environment: str) -> None:
         self.screen = pyte.Screen(80, 24)
+        #: The screen is read while a thread feeds it.
+        self._lock = threading.Lock()
+        self._fault = ""
         self._stream = pyte.Stream(self.screen)
         self._master, slave = pty.openpty()
         self.text = ""
@@ -65,12 +69,17 @@ class Shell:
         self.shows(PROMPT)
 
     def _read(self) -> None:
+        decoder = codecs.getincrementaldecoder("utf-8")("replace")
         with contextlib.suppress(OSError):
             while data := os.read(self._master, 1 << 16):
                 self.reads.wait()
-                text = data.decode(errors="replace")
+                text = decoder.decode(data)
                 self.text += text
-                self._stream.feed(text)
+                try:
+                    with self._lock:
+                        self._stream.feed(text)
+                except Exception as error:  # noqa: BLE001 (or the screen would seem frozen)
+                    self._fault = f"{type(error).__name__}: {error}"
 
     def type(self, text: str) -> None:
         """Type it, with a key for each character."""
@@ -79,15 +88,26 @@ class Shell:
     @property
     def screen_text(self) -> str:
         """What the screen shows."""
-        return "\n".join(list(self.screen.display))
+        with self._lock:
+            return "\n".join(self.screen.display)
+
+    @property
+    def colours(self) -> set[str]:
+        """The colours of the text on the screen."""
+        with self._lock:
+            return {char.fg for line in self.screen.buffer.values() for char in line.values()}
 
     def shows(self, *words: str) -> None:
         """Wait until the screen shows them all."""
-        assert until(lambda: all(word in self.screen_text for word in words)), self.screen_text
+        assert until(lambda: all(word in self.screen_text for word in words)), (
+            self._fault,
+            self.screen_text,
+        )
 
     def resize(self, columns: int, rows: int) -> None:
         """Give the window another size."""
-        self.screen.resize(rows, columns)
+        with self._lock:
+            self.screen.resize(rows, columns)
         fcntl.ioctl(self._master, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
     def up(self, *words: str) -> None:

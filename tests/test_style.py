@@ -155,13 +155,13 @@ def test_no_name_of_a_test_is_longer_than_a_claim() -> None:
 MOST_STATEMENTS = {
     "foundation": 1_820,
     "model": 2_030,
-    "spec": 5_110,
+    "spec": 5_330,
     "compiler": 10_870,
     "tf": 5_950,
     "guard": 4_553,
     "launcher": 4_280,
-    "cli": 5_970,
-    "tools": 19_900,
+    "cli": 6_140,
+    "tools": 19_660,
 }
 
 

@@ -276,3 +276,42 @@ def test_the_floor_shows_a_lidars_height_and_fix_writes_it(robot: str, tmp_path:
     prove(tmp_path, "--fix")
     expected = robot.replace("36 cm", "40 cm")
     assert (tmp_path / "robot.yaml").read_text("utf-8") == expected
+
+
+@pytest.mark.parametrize("option", ["--as", "--robot"])
+def test_fix_writes_the_overlay_of_one_robot(option: str, record: Callable[..., Path]) -> None:
+    robot = ROBOT.replace("frames:", "overlays: {by: hostname, folder: overlays}\nframes:", 1)
+    folder = record(factors=FLIPPED, robot=robot)
+    overlay = folder / "overlays/ant.yaml"
+    overlay.parent.mkdir()
+    if option == "--robot":
+        overlay.write_text("tfcompose: 1\nsensors: {front_imu: {rpy: [0, 0, 1 deg]}}  # mine\n")
+    checks, errors = prove(folder, "--fix", option, "ant")
+    assert {check["answer"] for check in checks.values()} == {"agrees"}
+    assert "wrote overlays/ant.yaml" in errors
+    assert (folder / "robot.yaml").read_text("utf-8") == robot
+    text = overlay.read_text("utf-8")
+    assert "rpy: [180 deg, 0" in text
+    assert ("# mine" in text) == (option == "--robot")
+    assert "tool: prove" in text.partition("x-adjustments:")[2]
+    assert "from: bag" in text
+    prove(folder, "--robot", "ant")
+    undone = tfcompose_in(
+        folder, "calibrate", "robot.yaml", "front_imu", "--robot", "ant", "--undo"
+    )
+    assert undone.returncode == 0, undone.stderr
+    prove(folder, "--robot", "ant", code=1)
+
+
+def test_a_robot_without_overlays_and_two_names_are_refused(record: Callable[..., Path]) -> None:
+    folder = record(factors=FLIPPED)
+    assert "TF" in prove_text(folder, "--fix", "--as", "ant", code=1)
+    assert prove_text(folder, "--as", "ant", code=2)
+    assert prove_text(folder, "--fix", "--as", "ant", "--robot", "bee", code=2)
+
+
+def prove_text(folder: Path, *words: str, code: int) -> str:
+    """Return what went to stderr."""
+    done = tfcompose_in(folder, "prove", "robot.yaml", "--bag", "bag", *words)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stderr

@@ -21,12 +21,12 @@ from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, reject
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.cli.robot_overlay import RobotOverlay
     from tfcompose.compiler.compile import Compiled
     from tfcompose.compiler.mounts.edit import Mount
     from tfcompose.foundation.findings import Finding
     from tfcompose.spec.load import Source
     from tfcompose.tools.adjust.comparison import PoseComparison
-    from tfcompose.tools.adjust.robot_overlay import RobotOverlay
 
 #: Findings about a measured pose that is probably wrong.
 _DOUBTS = frozenset({"TF615", "TF616", "TF617", "TF618"})
@@ -68,9 +68,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Write the pose; exit code 0, 1 on findings, 2 if something cannot be read or written."""
+    from tfcompose.cli.robot_overlay import RobotOverlay
     from tfcompose.foundation.findings import RejectedError
     from tfcompose.foundation.reading import exists
-    from tfcompose.tools.adjust.robot_overlay import RobotOverlay
 
     _check_options(arguments)
     if arguments.calibration in _RESULTS and not exists(arguments.calibration):
@@ -142,7 +142,7 @@ def _mounted_frame(compiled: Compiled, source: Source, name: str) -> str:
 
 
 def _calibrate(arguments: Namespace, overlay: RobotOverlay, compiled: Compiled, child: str) -> int:
-    from tfcompose.tools.adjust.robot_overlay import fixed_mount
+    from tfcompose.cli.robot_overlay import fixed_mount
 
     mount = fixed_mount(compiled, child)
     measured = overlay.compile(overlay.text, _calibration_of(arguments, mount))
@@ -219,7 +219,7 @@ def _report(arguments: Namespace, comparison: PoseComparison) -> None:
 
 
 def _undo(arguments: Namespace, overlay: RobotOverlay, compiled: Compiled, child: str) -> int:
-    from tfcompose.tools.adjust.robot_overlay import fixed_mount
+    from tfcompose.cli.robot_overlay import fixed_mount
 
     mount = fixed_mount(compiled, child)
     undone, text = overlay.without_newest(mount)

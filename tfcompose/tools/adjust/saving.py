@@ -8,10 +8,10 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import load_robot
+from tfcompose.cli.robot_overlay import RobotOverlay
 from tfcompose.foundation.findings import RejectedError, finding
 from tfcompose.spec.language import overlay_path
 from tfcompose.spec.language.overlay import SETTING
-from tfcompose.tools.adjust.robot_overlay import RobotOverlay
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,9 +20,10 @@ from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, rej
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from datetime import date
 
+    from tfcompose.compiler.compile import Compiled
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import RosSettings
     from tfcompose.model.robot import Robot
@@ -46,7 +47,15 @@ def arguments(parser: ArgumentParser) -> None:
     add_for(parser, f"listen for S seconds; default: {DURATION_S:g}")
     add_bag(parser)
     parser.add_argument(
-        "--fix", action="store_true", help="write the fitting values to the robot file"
+        "--fix",
+        action="store_true",
+        help="write the fitting values to the robot file, or with --robot to that overlay",
+    )
+    parser.add_argument(
+        "--as",
+        dest="overlay",
+        metavar="NAME",
+        help="with --fix: write the overlay NAME.yaml, which may be new",
     )
     add_format(parser)
 
@@ -59,10 +68,16 @@ def run(arguments: Namespace) -> int:
 
     if arguments.bag and arguments.duration is not None:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
+    if arguments.overlay and not arguments.fix:
+        fail("--as goes with --fix", UNREADABLE)
+    if arguments.overlay and arguments.overlay_robot not in {None, arguments.overlay}:
+        fail("--as and --robot name two overlays: leave out one of them", UNREADABLE)
     day = recording_day(arguments.bag)
     robot, _ = compile_without_errors(arguments.file, arguments, day)
     _refuse_unknown_sensors(arguments, robot)
     measurements = _measure(arguments, robot.ros)
+    if arguments.fix and (arguments.overlay or arguments.overlay_robot):
+        return _report(arguments, *_fix_overlay(arguments, measurements, day))
     prove = _prover(arguments, measurements, day)
     verdicts = prove(read_text)
     fixed = _fix(arguments, prove) if arguments.fix else []
@@ -127,25 +142,46 @@ def _prover(
     The function takes a reader of files, so that it can also check an edited file.
     """
     from tfcompose.cli.compiling import compile_file
-    from tfcompose.compiler.check import apply
-    from tfcompose.tools.prove.proof import Proof
 
     def prove(read: Callable[[str], str]) -> list[SensorVerdict]:
         compiled = compile_file(arguments.file, arguments, day, read)
         if compiled.robot is None or compiled.errors:
             reject(compiled.findings)
         texts = {arguments.file: read(arguments.file)}
-        only = frozenset(arguments.sensors)
-        proof = Proof(compiled.robot, compiled.sources[0], texts, measurements, only)
-        verdicts = proof.verdicts()
-        kept, _ = apply(findings_of(verdicts), compiled.allows)
-        allowed = [each for each in verdicts if each.finding and each.finding not in kept]
-        return [
-            *(each for each in verdicts if each not in allowed),
-            *(replace(each, finding=None) for each in allowed),
-        ]
+        return _verdicts(compiled, texts, measurements, arguments.sensors)
 
     return prove
+
+
+def _verdicts(
+    compiled: Compiled,
+    texts: Mapping[str, str] | None,
+    measurements: Measurements,
+    sensors: Sequence[str],
+) -> list[SensorVerdict]:
+    """Return the verdicts on a robot without errors; those that comments allow are no findings.
+
+    ``texts`` are the files to edit; None: findings have no edits.
+    """
+    from tfcompose.compiler.check import apply
+    from tfcompose.tools.prove.proof import Proof
+
+    assert compiled.robot is not None  # noqa: S101 (compiled without errors)
+    proof = Proof(
+        compiled.robot,
+        compiled.sources[0],
+        texts or {},
+        measurements,
+        frozenset(sensors),
+        has_edits=texts is not None,
+    )
+    verdicts = proof.verdicts()
+    kept, _ = apply(findings_of(verdicts), compiled.allows)
+    allowed = [each for each in verdicts if each.finding and each.finding not in kept]
+    return [
+        *(each for each in verdicts if each not in allowed),
+        *(replace(each, finding=None) for each in allowed),
+    ]
 
 
 def _fix(
@@ -168,6 +204,49 @@ def _fix(
     except OSError as error:
         fail(f"{arguments.file} cannot be written: {error.strerror}", UNREADABLE)
     return fixer.fixed
+
+
+def _fix_overlay(
+    arguments: Namespace, measurements: Measurements, day: date | None
+) -> tuple[list[SensorVerdict], list[Finding]]:
+    """Write the poses that fit into the overlay of one robot.
+
+    As with a robot file, a pose is kept only if its check then agrees and no other differs.
+    Returns the verdicts with the overlay, and the findings that it removes.
+
+    Raises:
+        SystemExit: after reporting that the overlay cannot be read or written.
+    """
+    from tfcompose.cli.robot_overlay import RobotOverlay
+    from tfcompose.foundation.findings import RejectedError
+
+    def prove(overlay: RobotOverlay) -> list[SensorVerdict]:
+        compiled = overlay.compile(overlay.text)
+        return _verdicts(compiled, None, measurements, arguments.sensors)
+
+    name = arguments.overlay or arguments.overlay_robot
+    origin = arguments.bag or "the running robot"
+    fixed, tried = [], set()
+    try:
+        overlay = edited = RobotOverlay.open(arguments.file, arguments, name, day)
+        verdicts = prove(edited)
+        while fitting := [each for each in verdicts if each.fit and each.fit not in tried]:
+            fit, problem = fitting[0].fit, fitting[0].finding
+            assert fit is not None  # noqa: S101 (as above)
+            tried.add(fit)
+            changed = replace(edited, text=edited.with_pose(*fit, "prove", origin, joins=False))
+            after = prove(changed)
+            if problem and len(findings_of(after)) < len(findings_of(verdicts)):
+                fixed.append(problem)
+                edited, verdicts = changed, after
+        if edited.text is not None and fixed:
+            overlay.write(edited.text)
+            print(f"wrote {overlay.path}", file=sys.stderr)
+    except RejectedError as error:
+        reject(error.findings)
+    except OSError as error:
+        fail(f"{error.filename or arguments.file} cannot be written: {error.strerror}", UNREADABLE)
+    return verdicts, fixed
 
 
 def findings_of(verdicts: Sequence[SensorVerdict]) -> list[Finding]:

@@ -29,7 +29,7 @@ from tfcompose.tools.prove.verdict import CheckResult, SensorVerdict
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from tfcompose.foundation.findings import Edit, Finding, Span
+    from tfcompose.foundation.findings import Edit, Span
     from tfcompose.foundation.geometry import Quaternion
     from tfcompose.model.robot import Edge, MountedSensor, Robot
     from tfcompose.spec.load import Source
@@ -56,6 +56,8 @@ class Proof:
     measurements: Measurements
     #: The sensors or frames to check; empty for all.
     only: frozenset[str] = frozenset()
+    #: Whether findings have edits of the robot file.
+    has_edits: bool = True
 
     def verdicts(self) -> list[SensorVerdict]:
         """Return the verdicts of all checks, by sensor and topic."""
@@ -96,8 +98,7 @@ class Proof:
         if topic.type in CLOUDS and frame and judgements[0].answer == "agrees":
             judgements += self._judge_ranges(topic, frame, poses, odometry)
         for judgement in judgements:
-            finding = self._finding(name, topic, judgement, sensor, frame, poses)
-            yield SensorVerdict(name, topic.name, judgement, finding)
+            yield self._verdict(name, topic, judgement, sensor, frame, poses)
 
     def _frame_of(self, topic: MeasuredTopic) -> str:
         """Return the declared frame of a topic's messages; empty if there is none."""
@@ -237,15 +238,14 @@ class Proof:
                 self._limit("TF650"),
             )
             sensor = next((each for each in self.robot.sensors if each.name == names[1]), None)
-            problem = self._finding(names[1], topics[1], judgement, sensor, frames[1], poses)
-            yield SensorVerdict(names[1], second, judgement, problem)
+            yield self._verdict(names[1], topics[1], judgement, sensor, frames[1], poses)
 
     def _limit(self, code: str) -> float:
         """Return the limit of a code's measurement, in radians or metres."""
         default = CATALOGUE[code].limit
         return self.robot.limits.get(code, default[0] if default else 0.0)
 
-    def _finding(  # noqa: PLR0913, PLR0917 (what a finding is made of)
+    def _verdict(  # noqa: PLR0913, PLR0917 (what a finding is made of)
         self,
         name: str,
         topic: MeasuredTopic,
@@ -253,9 +253,10 @@ class Proof:
         sensor: MountedSensor | None,
         frame: str,
         poses: dict[str, Pose],
-    ) -> Finding | None:
+    ) -> SensorVerdict:
+        verdict = SensorVerdict(name, topic.name, judgement)
         if judgement.answer != "differs":
-            return None
+            return verdict
         message = f"{name} {judgement.text}"
         notes = [Note(f"{topic.name}, {topic.type}")]
         edge = self._mount_edge(sensor, frame)
@@ -264,7 +265,8 @@ class Proof:
         if edge is not None and judgement.code in {"TF650", "TF653", "TF654"}:
             span = self._pose_span(edge, _ROTATIONS if judgement.code == "TF650" else _POSITIONS)
         if edge is None or (rotation is None and xyz is None):
-            return finding(judgement.code, message, span, help=judgement.help, notes=notes)
+            problem = finding(judgement.code, message, span, help=judgement.help, notes=notes)
+            return replace(verdict, finding=problem)
         declared = poses[frame]
         base_from_frame = Pose(xyz or declared.xyz, rotation or declared.quat_xyzw)
         mount = edge.child
@@ -279,10 +281,11 @@ class Proof:
             new = Pose((x, y, z), edge.pose.quat_xyzw)
             advice = f"xyz: [{x:.3f}, {y:.3f}, {z:.3f}]"
         advice += f" of {mount} in {edge.parent} would fit{judgement.help}"
-        edits, reason = self._edits(mount, new)
+        edits, reason = self._edits(mount, new) if self.has_edits else ((), "")
         if reason:
-            notes.append(Note(f"--fix leaves it: {reason}"))
-        return finding(judgement.code, message, span, help=advice, notes=notes, edits=edits)
+            notes.append(Note(f"--fix leaves it: {reason}; --fix --as NAME writes an overlay"))
+        problem = finding(judgement.code, message, span, help=advice, notes=notes, edits=edits)
+        return replace(verdict, finding=problem, fit=(mount, new))
 
     def _mount_edge(self, sensor: MountedSensor | None, frame: str) -> Edge | None:
         """Return the edge that mounts a sensor or the body of a camera."""

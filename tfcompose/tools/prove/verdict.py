@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
-    from tfcompose.foundation.geometry import Quaternion, Vector
+    from tfcompose.foundation.geometry import Pose, Quaternion, Vector
 
 Answer = Literal["agrees", "differs", "cannot tell"]
 
@@ -44,6 +44,8 @@ class SensorVerdict:
     judgement: CheckResult
     #: The finding, if the measurement differs.
     finding: Finding | None = None
+    #: The mount and its pose in its parent that would fit, if a pose would.
+    fit: tuple[str, Pose] | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as JSON data."""

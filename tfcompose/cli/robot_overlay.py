@@ -20,18 +20,19 @@ from tfcompose.foundation.findings import RejectedError, finding
 from tfcompose.foundation.geometry import angle_between, norm
 from tfcompose.foundation.reading import exists
 from tfcompose.spec.language import load_robot_overlay, overlay_path
+from tfcompose.spec.language.overlay_text import OverlayChange, OverlayTextError, read_overlay
 from tfcompose.spec.load import load
-from tfcompose.tools.adjust.overlay_text import OverlayChange, OverlayTextError, read_overlay
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Mapping
+    from datetime import date
 
     from tfcompose.compiler.compile import Compiled
     from tfcompose.compiler.mounts.edit import Mount
     from tfcompose.foundation.geometry import Pose
+    from tfcompose.spec.language.overlay_text import OverlayText
     from tfcompose.spec.load import Source
-    from tfcompose.tools.adjust.overlay_text import OverlayText
 
 #: By how much a pose that is read back may differ from the one written, in metres and radians.
 _TOLERANCE = 1e-6
@@ -50,9 +51,13 @@ class RobotOverlay:
     path: str
     #: Its text; None: there is no such file.
     text: str | None
+    #: The day whose calibrations apply; None: those that are still valid.
+    day: date | None = None
 
     @classmethod
-    def open(cls, file: str, arguments: Namespace, robot: str) -> RobotOverlay:
+    def open(
+        cls, file: str, arguments: Namespace, robot: str, day: date | None = None
+    ) -> RobotOverlay:
         """Return the overlay of the robot with this name.
 
         Raises:
@@ -62,7 +67,7 @@ class RobotOverlay:
         path = overlay_path(source, robot)
         options = copy(arguments)
         options.overlay_robot, options.by_hostname = None, False
-        return cls(source, options, path, read_text(path) if exists(path) else None)
+        return cls(source, options, path, read_text(path) if exists(path) else None, day)
 
     def compile(self, text: str | None, *further: Source) -> Compiled:
         """Return the robot with this text as its overlay, and further ones merged over it.
@@ -81,25 +86,40 @@ class RobotOverlay:
 
         overlays = [] if text is None else [load_robot_overlay(self.path, read)]
         overlays += overlays_of(self.arguments, self.source, read)
-        return compile_loaded(self.source, [*overlays, *further], self.arguments, read=read)
+        return compile_loaded(self.source, [*overlays, *further], self.arguments, self.day, read)
 
     def save(
         self, child: str, parent_from_child: Pose, tool: str, source: str = "", *, joins: bool
     ) -> bool:
         """Write a frame's pose in its parent; return False if it has that pose already.
 
-        Each write is one of the mount's history, with its date, the ``tool``, the ``source`` of
-        the pose, and the pose that it replaced. With ``joins``, it is joined with the newest if
-        that is from the same tool: a hundred nudges are one. The file and its folder are created
-        if missing; a reader sees the old text or the new one.
+        The file and its folder are created if missing; a reader sees the old text or the new one.
 
         Raises:
             RejectedError: if the overlay cannot give the frame this pose; nothing is written.
             OSError: if the file cannot be written, or changed meanwhile; it is unchanged.
         """
+        text = self.with_pose(child, parent_from_child, tool, source, joins=joins)
+        if text is None:
+            return False
+        self.write(text)
+        return True
+
+    def with_pose(
+        self, child: str, parent_from_child: Pose, tool: str, source: str = "", *, joins: bool
+    ) -> str | None:
+        """Return the text with a frame's pose in its parent; None if it has that pose already.
+
+        Each pose is one of the mount's history, with its date, the ``tool``, the ``source`` of
+        the pose, and the pose that it replaced. With ``joins``, it is joined with the newest if
+        that is from the same tool: a hundred nudges are one.
+
+        Raises:
+            RejectedError: if the overlay cannot give the frame this pose.
+        """
         mount = fixed_mount(self.compile(self.text), child)
         if _is_same(mount.edge.pose, parent_from_child):
-            return False
+            return None
         overlay = self._read()
         adjustments = list(overlay.adjustments(mount.entry))
         adjustment = OverlayChange(
@@ -118,8 +138,7 @@ class RobotOverlay:
         edge = self._robot_edge(text, child)
         if edge is None or not _is_same(edge, parent_from_child):
             self._refuse(f"another overlay, a setting or a calibration places {child}")
-        self.write(text)
-        return True
+        return text
 
     def without_newest(self, mount: Mount) -> tuple[OverlayChange, str]:
         """Return the newest write of a mount's pose, and the overlay's text without it.

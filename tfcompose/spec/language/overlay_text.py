@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from tfcompose.compiler.mounts.rotations import FORMS
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.yaml_text import flow
+from tfcompose.spec.language.pose import ROTATIONS
 from tfcompose.spec.load import load
 from tfcompose.spec.load.editing import with_value
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path
 
 #: The keys of an entry that a pose replaces.
-POSE_KEYS = ("calibration", "xyz", *FORMS)
+POSE_KEYS = ("calibration", "xyz", *sorted(ROTATIONS))
 HISTORY = "x-adjustments"
 _SECTION = re.compile(rf"^{HISTORY}:[^\n]*(?:\n(?:[ \t][^\n]*)?)*", re.MULTILINE)
 _COMMENT = re.compile(r"(?:^|\s)(#[^\r\n]*)", re.MULTILINE)
@@ -141,7 +141,7 @@ class OverlayText:
             text += "tfcompose: 1\n"  # a file that holds nothing is no overlay
         if not self.history:
             return text
-        lines = [f"{HISTORY}:   # the poses that calibrate and nudge replaced"]
+        lines = [f"{HISTORY}:   # the poses that calibrate, nudge and prove replaced"]
         for name, items in self.history.items():
             lines += [f"  {flow(name)}:", *(f"    - {flow(item.as_data())}" for item in items)]
         return text.rstrip("\n") + "\n\n" + "\n".join(lines) + "\n"

@@ -5,7 +5,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tfcompose.tools.adjust.overlay_text import OverlayChange, OverlayTextError, read_overlay
+from tfcompose.spec.language.overlay_text import OverlayChange, OverlayTextError, read_overlay
 
 ENTRY_PATH = ("sensors", "eye")
 POSE = {"xyz": "[1, 2, 3]", "rpy": "[0, 0, 5 deg]"}

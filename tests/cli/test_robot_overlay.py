@@ -11,10 +11,10 @@ import pytest
 from tests.support.processes import run
 from tfcompose.cli import main
 from tfcompose.cli.options import add_variant
+from tfcompose.cli.robot_overlay import RobotOverlay, fixed_mount
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
-from tfcompose.tools.adjust.overlay_text import read_overlay
-from tfcompose.tools.adjust.robot_overlay import RobotOverlay, fixed_mount
+from tfcompose.spec.language.overlay_text import read_overlay
 
 ROBOT = """\
 tfcompose: 1
@@ -149,7 +149,7 @@ KILLER = """\
 import os, signal, sys
 from dataclasses import replace
 from pathlib import Path
-from tests.tools.adjust.test_robot_overlay import OVERLAY, opened
+from tests.cli.test_robot_overlay import OVERLAY, opened
 
 OLD, NEW = "# old\\ntfcompose: 1\\n", "# new\\ntfcompose: 1\\n"
 opened().write(OLD)
@@ -177,6 +177,6 @@ assert len(results) > 20, results
 
 
 def test_a_killed_write_leaves_the_old_file_or_the_new_file() -> None:
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
     ended = run([sys.executable, "-c", KILLER], env=environment)
     assert ended.returncode == 0, ended.stderr

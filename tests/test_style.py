@@ -153,15 +153,15 @@ def test_no_name_of_a_test_is_longer_than_a_claim() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_820,
+    "foundation": 1_830,
     "model": 2_030,
     "spec": 5_330,
     "compiler": 10_870,
     "tf": 5_950,
     "guard": 4_553,
     "launcher": 4_280,
-    "cli": 6_140,
-    "tools": 19_660,
+    "cli": 6_200,
+    "tools": 20_400,
 }
 
 

@@ -8,9 +8,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations as subsets
 from typing import TYPE_CHECKING, NamedTuple
 
+from tfcompose.cli.robot_search import language_of
 from tfcompose.cli.terminal import warn
-from tfcompose.foundation.findings import Note
+from tfcompose.foundation.findings import Finding, Note
+from tfcompose.foundation.hooks import run_hook
 from tfcompose.foundation.reading import is_folder, names_in
+from tfcompose.foundation.tool import FileToCheck
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.compiler.compile import Compiled
     from tfcompose.compiler.resolve import Disk, Library
-    from tfcompose.foundation.findings import Finding, Span
+    from tfcompose.foundation.findings import Span
     from tfcompose.spec.language import BuildInputs
     from tfcompose.spec.language.arguments import Combination
     from tfcompose.spec.load import Source
@@ -52,6 +55,17 @@ class Linter:
     has_one_file: bool
     #: Called with each folder of overlays before it is listed.
     on_folder: Callable[[str], object] = lambda _: None
+
+    def lint(self, file: str, read: Callable[[str], str]) -> list[Finding]:
+        """Return the findings of a robot file, or of a file in the language of a tool."""
+        language = language_of(file)
+        if language is None:
+            return self.lint_robot(file, read)
+        files = self._files_of(file, read)
+        options = self.arguments
+        request = FileToCheck(file, files.read, options.trust, options.untrusted)
+        findings = run_hook(language.check, language.name, None, request)
+        return [findings] if isinstance(findings, Finding) else findings
 
     def lint_robot(self, file: str, read: Callable[[str], str]) -> list[Finding]:
         """Return the findings of a robot file, sorted by place.

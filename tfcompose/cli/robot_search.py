@@ -1,4 +1,4 @@
-"""Search for the robot files in a folder and its subfolders."""
+"""Search for robot files, and others that ``lint`` checks, in a folder and its subfolders."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 from tfcompose.cli.terminal import warn
 from tfcompose.foundation.procfs import PROC
+from tfcompose.foundation.tool import Language, installed_tools, shipped_tools
 
 YAML_ENDINGS = (".yaml", ".yml")
 #: The key ``tfcompose`` at the beginning of a line. If the user has misspelt it, the key ``robot``
@@ -26,10 +27,11 @@ _OF_KERNEL = frozenset({PROC, "/sys", "/dev"})
 
 
 def robots_in(name: str) -> list[str]:
-    """Return the robot files in a folder, or else ``name`` itself.
+    """Return the files in a folder that ``lint`` checks, or else ``name`` itself.
 
-    A robot file is a YAML file with a line that begins with tfcompose:. The search skips hidden
-    folders, the kernel's folders, and other file systems (as ``find -xdev`` does).
+    These are robot files, and files of tools, which their names show. A robot file is a YAML file
+    with a line that begins with tfcompose:. The search skips hidden folders, the kernel's folders,
+    and other file systems (as ``find -xdev`` does).
     """
     from tfcompose.foundation.reading import is_file
 
@@ -43,7 +45,7 @@ def robots_in(name: str) -> list[str]:
             if not folder.startswith(".") and _is_searched(f"{top}/{folder}", device)
         ]
         paths = [str(Path(top, file)) for file in sorted(files) if file.endswith(YAML_ENDINGS)]
-        robots += [path for path in paths if is_file(path) and is_robot(path)]
+        robots += [path for path in paths if is_file(path) and is_checked(path)]
         progress.count_files(len(paths))
     return robots or [name]
 
@@ -78,6 +80,20 @@ def _device(folder: str) -> int:
 def _is_searched(folder: str, device: int) -> bool:
     """Return whether a folder is on this file system and is not the kernel's."""
     return os.path.realpath(folder) not in _OF_KERNEL and _device(folder) == device
+
+
+def is_checked(file: str) -> bool:
+    """Return whether the file is a robot file, or in the language of a tool."""
+    return language_of(file) is not None or is_robot(file)
+
+
+def language_of(file: str) -> Language | None:
+    """Return the language of a tool that the file is in, by its name; None for another file.
+
+    Tools of other packages are looked up only for a file that is no robot file.
+    """
+    language = shipped_tools().language_of(file)
+    return language if language or is_robot(file) else installed_tools().language_of(file)
 
 
 def is_robot(file: str) -> bool:

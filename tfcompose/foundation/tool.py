@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
 #: The package with the table ``TOOLS`` of tfcompose's own tools. The core knows it only by this
 #: name.
@@ -86,8 +86,20 @@ class Key(NamedTuple):
         return hash((self.name, self.model))
 
 
+class FileToCheck(NamedTuple):
+    """A file that ``lint`` checks by the function of its language."""
+
+    file: str
+    #: Returns the text of the file.
+    read: Callable[[str], str]
+    #: Whether xacro files may run outside of the sandbox.
+    trust: bool
+    #: Whether no other file may be read, because the file is untrusted.
+    is_untrusted: bool
+
+
 class Language(NamedTuple):
-    """A kind of file with its own language, for ``schema``.
+    """A kind of file with its own language, for ``schema`` and ``lint``.
 
     It has a name, a model, and the title of its reference.
     """
@@ -95,6 +107,10 @@ class Language(NamedTuple):
     name: str
     model: str
     title: str
+    #: The ends of the names of such files. ``lint`` reads other files as robot files.
+    endings: tuple[str, ...] = ()
+    #: With ``endings``: a function that takes a ``FileToCheck`` and returns findings.
+    check: str = ""
 
 
 class Option(NamedTuple):
@@ -184,6 +200,11 @@ class Toolset(NamedTuple):
     def languages(self) -> dict[str, Language]:
         """Return the kinds of files by name."""
         return {language.name: language for tool in self.tools for language in tool.languages}
+
+    def language_of(self, file: str) -> Language | None:
+        """Return the language that ``lint`` checks a file by; None for a robot file."""
+        languages = self.languages().values()
+        return next((each for each in languages if file.endswith(each.endings)), None)
 
     def options(self, command: str) -> list[Option]:
         """Return the options that tools add to a command of the core."""

@@ -142,6 +142,22 @@ def test_a_failed_expectation_is_reported_at_its_line(
     assert done.stdout.splitlines()[-1] == "1 case, 1 failed"
 
 
+def test_lint_reports_what_test_would_before_it_runs_a_case(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(ROBOT, "utf-8")
+    suite = tmp_path / "cart.test.yaml"
+    expect = "{edges: {odom → bas_link: {owner: drive}}, complete: soon}"
+    suite.write_text(f"robot: robot.yaml\ncases:\n  - name: x\n    expect: {expect}\n", "utf-8")
+    for words in (["cart.test.yaml"], ["."], ["--untrusted", "cart.test.yaml"]):
+        assert failures(tfcompose_in(tmp_path, "lint", *words)) == ["4:66: error[TF103]"]
+    suite.write_text(suite.read_text("utf-8").replace("soon", "3 s"), "utf-8")
+    for words in (["cart.test.yaml"], ["--skip-foreign", "cart.test.yaml", "robot.yaml"]):
+        done = tfcompose_in(tmp_path, "lint", *words)
+        assert failures(done) == ["4:22: error[TF930]"]
+        assert done.returncode == 1
+    done = tfcompose_in(tmp_path, "lint", "--untrusted", "cart.test.yaml")
+    assert done.returncode == 0, done.stdout  # it reads no other file
+
+
 @pytest.mark.parametrize(("timeout", "late"), [("1 s", ["1"]), ("0.1 s", ["1", "2"])])
 def test_a_lookup_waits_for_its_timeout(timeout: str, late: list[str], judge: Judge) -> None:
     """The transforms for 1 s and 2 s come at 2.5 s."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose import __version__
 from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
-from tfcompose.cli.robot_search import YAML_ENDINGS, is_robot, robots_in
+from tfcompose.cli.robot_search import YAML_ENDINGS, is_checked, robots_in
 from tfcompose.cli.terminal import (
     CLEAR,
     MOST_OF_ONE_CODE,
@@ -49,8 +49,8 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="FILE",
         default=[],
         help=(
-            "robot files, folders of them, .urdf and .xacro files, or - for standard input;"
-            " default: robot.yaml"
+            "robot files, folders of them, .urdf, .xacro and .test.yaml files, or - for standard"
+            " input; default: robot.yaml"
         ),
     )
     parser.add_argument(
@@ -186,7 +186,7 @@ def _lint(
     robots = [file for file in files if file not in urdfs]
 
     def lint(file: str, read: Callable[[str], str]) -> list[Finding]:
-        return _select_findings(linter.lint_robot(file, read), arguments)
+        return _select_findings(linter.lint(file, read), arguments)
 
     is_changed = False
     if arguments.fix or arguments.diff:
@@ -261,7 +261,7 @@ def _files(arguments: Namespace) -> list[str]:
     files = dict.fromkeys(file for name in names for file in robots_in(name))
     if not arguments.skip_foreign:
         return list(files)
-    return [file for file in files if not file.endswith(YAML_ENDINGS) or is_robot(file)]
+    return [file for file in files if not file.endswith(YAML_ENDINGS) or is_checked(file)]
 
 
 def _select_findings(findings: list[Finding], arguments: Namespace) -> list[Finding]:

@@ -22,10 +22,11 @@ from tfcompose.tools.treetest.relayed_plan import find_obstacles
 from tfcompose.tools.treetest.spec import SuiteSpec, validate_suite
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from datetime import date
 
     from tfcompose.foundation.findings import Finding, Span
+    from tfcompose.foundation.tool import FileToCheck
     from tfcompose.model.plan import Plan
     from tfcompose.spec.load import Path as SpecPath
     from tfcompose.spec.load import Source
@@ -85,6 +86,8 @@ class CaseLoader:
 
     #: Whether xacro files may run outside of the sandbox.
     trust: bool
+    #: Returns the text of a test file.
+    read: Callable[[str], str] = read_text
     _plans: dict[tuple[str, tuple[str, ...], date | None, bool], Plan] = field(
         default_factory=dict
     )
@@ -95,7 +98,7 @@ class CaseLoader:
         Raises:
             RejectedError: with every finding about it, its robot and its recordings.
         """
-        text = read_text(file)
+        text = self.read(file)
         source = load(text, file, SuiteSpec.BEGIN)
         suite = validate_suite(source)
         cases: list[Case] = []
@@ -151,6 +154,21 @@ class CaseLoader:
                 raise RejectedError(compiled.errors)
             self._plans[key] = plan_of(compiled.robot.with_final_names())
         return self._plans[key]
+
+
+def check_file(request: FileToCheck) -> list[Finding]:
+    """Return what ``test`` would report before it runs a case, for ``lint``.
+
+    The robot and the recordings of an untrusted file are not read.
+    """
+    try:
+        if request.is_untrusted:
+            validate_suite(load(request.read(request.file), request.file, SuiteSpec.BEGIN))
+        else:
+            CaseLoader(request.trust, request.read).load(request.file)
+    except RejectedError as error:
+        return list(error.findings)
+    return []
 
 
 def variant_of(profiles: Iterable[str], *, trust: bool, starts: bool) -> Namespace:

@@ -117,7 +117,15 @@ def test_a_refused_name_is_answered_with_a_near_one(tmp_path: Path) -> None:
     assert "rover_bringup" in done.stderr
 
 
-@pytest.mark.parametrize("options", [("--cmake",), ("--package", "rover", "--name", "3")], ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--cmake",),
+        ("--package", "rover", "--name", "3"),
+        ("--package", "rover", "--tests", "robot.yaml"),
+    ],
+    ids=str,
+)
 def test_options_that_make_no_package_are_refused(
     options: tuple[str, ...], tmp_path: Path
 ) -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import shutil
+import sysconfig
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+from xml.etree import ElementTree as ET
 
 import pytest
 
+from tests.support.bags import UP, Sent, write_bag
 from tests.support.cli import tfcompose_in
+from tests.support.house import ROOT
 from tests.support.ros2_launch import Ros2Launch, needs_ros2_launch
 from tests.support.ros2_launch import ros2_launch as _fixture
 from tests.support.workspace import Workspace
@@ -27,55 +31,94 @@ pytestmark = [
     needs_ros2_launch,
 ]
 ros2_launch = _fixture
-ROBOT = "rover_bringup/robots/rover.tfc.yaml"
+ROBOT = "robots/rover.tfc.yaml"
 #: ament_cmake is in a distribution, or beside colcon.
 PREFIX = f"-DCMAKE_PREFIX_PATH={Path(COLCON).parents[1]}"
+
+
+#: The folders with the installed plug-in for pytest, and with the code that it imports.
+PLUGIN = os.pathsep.join((sysconfig.get_path("purelib"), str(ROOT)))
+CASES = """\
+robot: ../robots/rover.tfc.yaml
+cases:
+  - name: an IMU as declared
+    bag: ../run_17
+    expect: {pose: {base_link → imu_link: {xyz: [0, 0, 0.1]}}}
+"""
+IMU: Sent = ("/tf_static", 0.0, "base_link", "imu_link", 0.0, (0.0, 0.0, 0.1), UP)
+
+
+class Package(NamedTuple):
+    """A workspace with a package, and where colcon leaves the results of its tests."""
+
+    workspace: Workspace
+    results: Path
+    #: Whether the Python that runs pytest has tfcompose, and with it the plug-in.
+    has_plugin: bool
+
+    @property
+    def folder(self) -> Path:
+        return self.workspace.source / "rover_bringup"
+
+    def test(self) -> subprocess.CompletedProcess[str]:
+        """Run ``colcon test``; return what ``colcon test-result`` says."""
+        path = os.environ["PYTHONPATH"] + (self.has_plugin * f"{os.pathsep}{PLUGIN}")
+        tested = self.workspace.run(f"PYTHONPATH={path} colcon test", sourced=False)
+        assert tested.returncode == 0, tested.stdout + tested.stderr
+        return self.workspace.colcon("test-result", "--verbose")
+
+    def tests(self) -> set[str]:
+        """Return the names of the tests that ran."""
+        cases = ET.parse(self.results).iter("testcase")  # noqa: S314 (colcon's file)
+        return {case.get("name", "") for case in cases}
 
 
 @pytest.fixture(
     scope="module",
     params=[
-        ((), ()),
-        ((), ("--symlink-install",)),
-        (("--cmake",), ("--cmake-args", PREFIX)),
-        (("--cmake",), ("--symlink-install", "--cmake-args", PREFIX)),
+        ((), (), True),
+        ((), ("--symlink-install",), False),
+        (("--cmake",), ("--cmake-args", PREFIX), False),
+        (("--cmake",), ("--symlink-install", "--cmake-args", PREFIX), True),
     ],
     ids=["python", "python linked", "cmake", "cmake linked"],
 )
-def workspace(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Workspace:
-    init, build = request.param
-    made = Workspace(tmp_path_factory.mktemp("package") / "ws")
-    done = tfcompose_in(made.source, "init", "rover", "--package", "rover_bringup", *init)
+def package(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Package:
+    init, build, has_plugin = request.param
+    workspace = Workspace(tmp_path_factory.mktemp("package") / "ws")
+    results = workspace.folder / "build" / "rover_bringup" / "pytest.xml"
+    if init:
+        results = results.parent / "test_results" / "rover_bringup" / "robots.xunit.xml"
+    made = Package(workspace, results, has_plugin)
+    done = tfcompose_in(workspace.source, "init", "rover", "--package", "rover_bringup", *init)
     assert done.returncode == 0, done.stderr
-    done = made.colcon("build", *build)
+    write_bag(made.folder / "run_17", [IMU])
+    (made.folder / "test" / "rover.test.yaml").write_text(CASES, "utf-8")
+    done = workspace.colcon("build", *build)
     assert (done.returncode, "1 package finished" in done.stdout) == (0, True), done.stderr
     assert "had stderr output" not in done.stdout, done.stderr
     return made
 
 
-def test_it_is_green_and_red_after_a_mistake_in_the_robot_file(workspace: Workspace) -> None:
-    green = run_colcon_test(workspace)
-    assert (green.returncode, " 0 tests" in green.stdout) == (0, False), green.stdout
-    robot = workspace.source / ROBOT
-    text = robot.read_text("utf-8")
+def test_it_is_green_and_red_after_mistakes(package: Package) -> None:
+    green = package.test()
+    assert green.returncode == 0, green.stdout
+    assert ("an IMU as declared" in package.tests()) == package.has_plugin
+    text = (package.folder / ROBOT).read_text("utf-8")
     before, _, after = text.partition("generic/imu, parent: base_link")
     assert after
-    robot.write_text(f"{before}generic/imu, parent: base_lnk{after}", "utf-8")
+    wrong = package.folder / "robots" / "wrong.tfc.yaml"
+    wrong.write_text(f"{before}generic/imu, parent: base_lnk{after}", "utf-8")
+    cases = package.folder / "test" / "rover.test.yaml"
+    cases.write_text(CASES.replace("0, 0, 0.1", "0, 0, 0.2"), "utf-8")
     try:
-        red = run_colcon_test(workspace)
+        red = package.test()
     finally:
-        robot.write_text(text, "utf-8")
-    line, column = before.count("\n") + 1, 38
+        wrong.unlink()
+        cases.write_text(CASES, "utf-8")
     assert red.returncode == 1
-    assert f"{robot}:{line}:{column}: error[TF203]" in red.stdout
-
-
-def run_colcon_test(workspace: Workspace) -> subprocess.CompletedProcess[str]:
-    tested = workspace.colcon("test")
-    assert tested.returncode == 0, tested.stdout + tested.stderr
-    return workspace.colcon("test-result", "--verbose")
+    assert f"{wrong}:{before.count(chr(10)) + 1}:38: error[TF203]" in red.stdout
+    assert "test/rover.test.yaml:5:21: error[TF931]" in red.stdout
 
 
 @pytest.mark.parametrize(
@@ -84,9 +127,9 @@ def run_colcon_test(workspace: Workspace) -> subprocess.CompletedProcess[str]:
     ids=["robot file", "launch file"],
 )
 def test_ros2_launch_starts_the_robot(
-    workspace: Workspace, arguments: tuple[str, ...], ros2_launch: Ros2Launch
+    package: Package, arguments: tuple[str, ...], ros2_launch: Ros2Launch
 ) -> None:
-    installed = workspace.folder / "install" / "rover_bringup"
+    installed = package.workspace.folder / "install" / "rover_bringup"
     prefixes = f"{installed}{os.pathsep}{os.environ['AMENT_PREFIX_PATH']}"
     launch = ros2_launch("rover_bringup", *arguments, AMENT_PREFIX_PATH=prefixes)
     launch.until_says("tree complete")

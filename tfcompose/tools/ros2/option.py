@@ -57,13 +57,19 @@ def run(command: str, arguments: Namespace) -> int | None:
     _check_name(package)
     robot = arguments.name or package.removesuffix(_SUFFIX)
     robot_file = Path("robots", f"{robot}.tfc.yaml")
+    folder = Path(arguments.output or package)
+    if getattr(arguments, "tests", None) is not None:  # an option of another tool
+        fail(
+            "--package writes a robot file and --tests reads one: write the package first, then"
+            f" its tests with tfcompose init --tests {folder / robot_file}",
+            UNREADABLE,
+        )
     texts = template_files(arguments, robot, robot_file)
     build_type = AMENT_CMAKE if arguments.cmake else AMENT_PYTHON
     files = [
         *package_files(package, robot, build_type, _maintainer()),
         *(File(path.as_posix(), text) for path, text in texts.items()),
     ]
-    folder = Path(arguments.output or package)
     try:
         create_folder(folder, files)
     except FileExistsError:

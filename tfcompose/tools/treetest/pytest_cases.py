@@ -33,8 +33,11 @@ class CaseFile(pytest.File):
             CollectError: with all that is wrong with the file, its robot and its recordings.
         """
         loader = CaseLoader(trust=self.config.getoption("tfcompose_trust"))
+        path = os.path.relpath(self.path)
+        if path.startswith(os.pardir):  # CTest works in the build folder
+            path = str(self.path)
         try:
-            cases = loader.load(os.path.relpath(self.path))
+            cases = loader.load(path)
         except RejectedError as error:
             raise self.CollectError(_text(error.findings)) from None
         for case in cases:

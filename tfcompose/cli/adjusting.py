@@ -81,6 +81,11 @@ def reset(edge: PlanEdge) -> PlanEdge:
     return replace(edge, pose=edge.earlier[0], earlier=())
 
 
+def describe_adjustment(edge: PlanEdge) -> str:
+    """Return how far an edge of the running robot is from the built one."""
+    return f"adjusted by {edge.adjustment.text}" if edge.adjustment else "as built"
+
+
 def adjust(runtime_dir: RuntimeDir, choose: Callable[[Plan], Edges]) -> Edges:
     """Have a running robot follow other poses, and return the edges with them.
 

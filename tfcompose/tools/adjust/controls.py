@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.adjusting import moved, reset, undone
+from tfcompose.cli.adjusting import describe_adjustment, moved, reset, undone
 from tfcompose.cli.tables import Table, shorten
 from tfcompose.compiler.render.text import BOLD, PLAIN
 from tfcompose.foundation.numbers import number
@@ -130,7 +130,7 @@ class Controls:
         number_of = next((at for at, edge in enumerate(mounts) if edge.child == self.child), 0)
         room = max(rows - _OTHER_ROWS, 1)
         first = min(max(number_of - room // 2, 0), max(len(mounts) - room, 0))
-        table = [(short_name(edge), edge.name, _state(edge)) for edge in mounts]
+        table = [(short_name(edge), edge.name, describe_adjustment(edge)) for edge in mounts]
         lines = _TABLE.lines(table, columns - 2) if table else ["no mount can be nudged"]
         texts = [(f" {self.name}".ljust(columns), _REVERSE)]
         for at, line in [*enumerate(lines)][first : first + room]:
@@ -175,10 +175,6 @@ class Controls:
         if self._confirming:
             return f"r again resets {self.child} to its built pose"
         return self.message
-
-
-def _state(edge: PlanEdge) -> str:
-    return f"adjusted by {edge.adjustment.text}" if edge.adjustment else "as built"
 
 
 def _fit(text: str, style: str, columns: int) -> str:

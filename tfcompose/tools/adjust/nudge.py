@@ -239,8 +239,7 @@ def _step(arguments: Namespace, changes: Sequence[PoseChange]) -> Callable[[Plan
 
 def _describe(edge: PlanEdge) -> str:
     """Return an edge's pose, and how far it is from the built one."""
+    from tfcompose.cli.adjusting import describe_adjustment
     from tfcompose.guard.verdict.publishers import show_pose
 
-    offset = edge.adjustment
-    state = "as built" if offset is None else f"adjusted by {offset.text}"
-    return f"{edge.name}: {show_pose(edge.pose)}; {state}"
+    return f"{edge.name}: {show_pose(edge.pose)}; {describe_adjustment(edge)}"

@@ -7,7 +7,7 @@ import time
 import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
-from tfcompose.cli.adjusting import adjust, moved
+from tfcompose.cli.adjusting import adjust, describe_adjustment, moved
 from tfcompose.cli.process_table import HEAD, row, state_of, uptime
 from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject, warn
@@ -135,7 +135,7 @@ class LiveSource(SceneSource):
             edges = adjust(runtime_dir, choose)
         except (RuntimeDirError, RequestRefusedError, RejectedError, OSError, ValueError) as error:
             return [f"{robot.name} does not follow: {error}"]
-        lines = [f"{edge.name}: {_adjustment(edge)}" for edge in edges.values()]
+        lines = [f"{edge.name}: {describe_adjustment(edge)}" for edge in edges.values()]
         return lines + [
             f"{name} moves after save and up --update: {owner} publishes it"
             for name, owner in later.items()
@@ -283,11 +283,6 @@ def _run_of(name: str) -> RuntimeDir | None:
     domain = domain_of(os.environ)
     runs = (runtime_dir for runtime_dir, _ in running())
     return next((run for run in runs if run.domain == domain and is_meant(run, name)), None)
-
-
-def _adjustment(edge: PlanEdge) -> str:
-    """Return how far the running robot's edge is from the built one."""
-    return f"adjusted by {edge.adjustment.text}" if edge.adjustment else "as built"
 
 
 def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:

@@ -1,5 +1,8 @@
 """Adjusted edges, and files of a plan with them."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,10 +10,14 @@ import pytest
 import yaml
 import yourdfpy
 
+from tests.support import processes
 from tests.support.cli import tfcompose
-from tfcompose.cli.adjusting import MOST_EARLIER, _files_of, moved, reset, undone
+from tests.support.waiting import until
+from tfcompose.cli.adjusting import MOST_EARLIER, _files_of, _remove_earlier, moved, reset, undone
 from tfcompose.compiler.urdf.write import with_pose
+from tfcompose.foundation import procfs
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.launcher.runtime_dir import RuntimeDir
 from tfcompose.model.plan import PlanEdge, SourceLine
 from tfcompose.model.plan.file import read_plan
 
@@ -121,3 +128,26 @@ def test_every_description_has_the_pose_and_nothing_else_changes(
         quat = robot.get_transform("lamp", "mast")
         assert quat == pytest.approx(robot.get_transform("mast", "mast"))
         assert text.count("it's") == 1
+
+
+def test_copies_of_plans_stay_while_a_process_was_started_with_them(tmp_path: Path) -> None:
+    runtime_dir = RuntimeDir("rover@1", tmp_path, tmp_path / "logs")
+    folders = {name: runtime_dir.plan_folder(name) for name in ("built", "used", "old", "new")}
+    for name, folder in folders.items():
+        folder.mkdir(parents=True)
+        (folder / "plan.json").write_text("{}" if name == "built" else '{"earlier": []}')
+        os.utime(folder, (1, 1))
+    runtime_dir.link_plan(folders["new"])
+    code = "import sys; sys.stdin.read()"
+    command = [sys.executable, "-c", code, str(folders["used"] / "plan.json")]
+    reader = processes.start(command, stdin=subprocess.PIPE)
+    try:
+        assert until(lambda: str(folders["used"]) in " ".join(procfs.argv(reader.pid)))
+        _remove_earlier(runtime_dir, folders["old"])
+        assert all(folder.exists() for folder in folders.values()), "replaced a moment ago"
+        os.utime(folders["old"], (1, 1))
+        _remove_earlier(runtime_dir, folders["new"])
+        existing = {name for name, folder in folders.items() if folder.exists()}
+        assert existing == {"built", "used", "new"}
+    finally:
+        processes.end(reader)

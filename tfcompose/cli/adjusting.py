@@ -7,17 +7,20 @@ listeners and restarted processes get it, too. The robot file stays as it is.
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 import time
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.plans import PLAN, digest_of, files_of, write_copy
 from tfcompose.cli.runs import plan_file
 from tfcompose.compiler.emit.argv import edit_description
 from tfcompose.compiler.urdf.write import with_pose
+from tfcompose.foundation import procfs
 from tfcompose.foundation.numbers import clean
 from tfcompose.launcher.control import RequestRefusedError, ask
 from tfcompose.model.messages import AdjustRequest, PlanChange
@@ -39,8 +42,7 @@ MOST_EARLIER = 100
 #: attempts, in seconds. The pauses are random: otherwise the quicker one of two commands wins
 #: each time.
 _RETRY_S, _PAUSE_S = 5.0, 0.05
-#: Copies of earlier adjustments are kept this long, for processes that are being started, in
-#: seconds.
+#: How long copies of earlier adjustments are kept after they were replaced, in seconds.
 _KEPT_S = 5.0
 
 
@@ -117,7 +119,7 @@ def adjust(runtime_dir: RuntimeDir, choose: Callable[[Plan], Edges]) -> Edges:
                 raise
             time.sleep(random.uniform(0, _PAUSE_S))  # noqa: S311 (no secret)
             continue
-        _remove_earlier(runtime_dir, folder)
+        _remove_earlier(runtime_dir, running.file.parent)
         return edges
 
 
@@ -146,14 +148,41 @@ def _part(process: PlanProcess) -> str:
     return process.name.rpartition("/")[0]
 
 
-def _remove_earlier(runtime_dir: RuntimeDir, current: Path) -> None:
-    """Remove copies of earlier adjustments."""
+def _remove_earlier(runtime_dir: RuntimeDir, replaced: Path) -> None:
+    """Remove copies of earlier adjustments, unless a process was started with one.
+
+    A process that is being started shows the copy in its command line a moment later: a copy that
+    was just ``replaced`` is kept for that time.
+    """
+    try:
+        os.utime(replaced)
+        current = runtime_dir.linked_plan()
+    except OSError:  # another command has removed the copy, or the robot has ended
+        return
     before = time.time() - _KEPT_S
-    for folder in runtime_dir.plan_folders():
-        try:
-            text = (folder / PLAN).read_text(encoding="utf-8")
-            is_earlier = '"earlier": ' in text and folder.stat().st_mtime < before
-        except OSError:
-            continue
-        if folder != current and is_earlier:
+    earlier = [
+        folder
+        for folder in runtime_dir.plan_folders()
+        if folder != current and _is_adjusted(folder, before)
+    ]
+    arguments = "\n".join(chain.from_iterable(map(_argv, procfs.pids() if earlier else ())))
+    for folder in earlier:
+        if folder.name not in arguments:
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_adjusted(folder: Path, before_s: float) -> bool:
+    """Return whether a copy has adjusted edges, and was replaced before that time."""
+    try:
+        text = (folder / PLAN).read_text(encoding="utf-8")
+        return '"earlier": ' in text and folder.stat().st_mtime < before_s
+    except OSError:
+        return False
+
+
+def _argv(pid: int) -> list[str]:
+    """Return a process's command line; empty if it has ended."""
+    try:
+        return procfs.argv(pid)
+    except OSError:
+        return []

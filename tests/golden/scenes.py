@@ -933,8 +933,9 @@ def calibrated() -> Iterator[Finding]:
             options = ["--with", "new.yaml", "--robot", robot]
             yield from _refused(partial(main, ["calibrate", name, *options]))
         yield from _refused(partial(main, ["calibrate", "lidar", "--undo", "--robot", "bee"]))
-        options = ["--with", "new.yaml", "--robot", "a/b"]
-        yield from _refused(partial(main, ["calibrate", "lidar", *options]))
+        for file, robot in (("new.yaml", "a/b"), ("kalibr", "bee")):
+            options = ["--with", file, "--robot", robot]
+            yield from _refused(partial(main, ["calibrate", "lidar", *options]))
 
 
 #: A recording lacks the laser, and is too slow.

@@ -170,6 +170,32 @@ def test_kalibr_has_names_of_its_own_and_the_mount_is_solved_for(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
+    ("tool", "folder", "name"),
+    [
+        ("easy_handeye2", "home/.ros2/easy_handeye2/calibrations", "eye.calib"),
+        ("CalibrationTools", ".", "calibration_results.yaml"),
+    ],
+)
+def test_a_tools_name_stands_for_its_newest_result(
+    tool: str, folder: str, name: str, picker: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(picker / "home"))
+    options = ("calibrate", "eye", "--with", tool, "--robot", "arm7")
+    ended = tfcompose_in(picker, *options)
+    assert (ended.returncode, "[TF668]" in ended.stderr) == (1, True), ended.stderr
+    file = picker / folder / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(handeye() if tool == "easy_handeye2" else FORMATS["autoware"], "utf-8")
+    old = file.with_stem(f"{file.stem}_old")
+    old.write_text("no calibration", "utf-8")
+    os.utime(old, (1, 1))
+    ended = tfcompose_in(picker, *options)
+    assert ended.returncode == 0, ended.stderr
+    assert name in ended.stdout.partition("\n")[0]
+    assert transform(picker, "tool0", LENS) == pytest.approx(expected(), abs=2e-7)
+
+
+@pytest.mark.parametrize(
     ("arguments", "place", "code"),
     [
         (("eyes", "--with", "new.calib"), "robot.yaml:36:1", "TF660"),

@@ -30,8 +30,10 @@ if TYPE_CHECKING:
 
 #: Findings about a measured pose that is probably wrong.
 _DOUBTS = frozenset({"TF615", "TF616", "TF617", "TF618"})
-#: Where tools write their results: easy_handeye2 into the home folder, kalibr beside the bag.
+#: Where tools write their results: easy_handeye2 into the home folder, kalibr beside the bag,
+#: CalibrationTools into the folder in which it was started, unless the user names another.
 _RESULTS = {
+    "CalibrationTools": (".", "calibration_results*.yaml"),
     "easy_handeye2": ("~/.ros2/easy_handeye2/calibrations", "*.calib"),
     "kalibr": (".", "*camchain*.yaml"),
 }
@@ -73,10 +75,10 @@ def run(arguments: Namespace) -> int:
     from tfcompose.foundation.reading import exists
 
     _check_options(arguments)
-    if arguments.calibration in _RESULTS and not exists(arguments.calibration):
-        arguments.calibration = _newest_result(arguments.calibration)
     robot = arguments.overlay_robot or os.uname().nodename
     try:
+        if arguments.calibration in _RESULTS and not exists(arguments.calibration):
+            arguments.calibration = _newest_result(arguments.calibration)
         overlay = RobotOverlay.open(arguments.file, arguments, robot)
         compiled = overlay.compile(overlay.text)
         child = _mounted_frame(compiled, overlay.source, arguments.sensor)
@@ -111,12 +113,16 @@ def _newest_result(tool: str) -> str:
     """Return the newest calibration file that a tool has written.
 
     Raises:
-        SystemExit: if there is none.
+        RejectedError: if there is none.
     """
+    from tfcompose.foundation.findings import RejectedError, finding
+
     folder, pattern = _RESULTS[tool]
     files = [path for path in Path(folder).expanduser().glob(pattern) if path.is_file()]
     if not files:
-        fail(f"there is no {folder}/{pattern} of {tool}: name the file", UNREADABLE)
+        place = "the current folder" if folder == "." else folder
+        message = f"{place} has no result of {tool}, {pattern}"
+        raise RejectedError([finding("TF668", message, None, help="name the file: --with FILE")])
     return str(max(files, key=lambda path: path.stat().st_mtime))
 
 

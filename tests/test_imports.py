@@ -86,6 +86,7 @@ ONLY_IN: dict[str, set[str]] = {
     "xxhash": {"tf.ros"},
     "rosbags": {"tf.bag_writing", "tf.bags", "tools.prove", "tools.rebag", "tools.treetest"},
     "mcap": {"tools.rebag"},
+    "lz4": {"tools.rebag"},
     "zstandard": {"tools.rebag"},
     "tf2_msgs": {"tf.ros"},
     "geometry_msgs": {"tf.ros"},

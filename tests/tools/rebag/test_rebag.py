@@ -13,16 +13,22 @@ import numpy as np
 import pytest
 import yaml
 from mcap.reader import make_reader
+from mcap.records import Attachment, Channel, Chunk, Metadata
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
+from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import CompressionMode, Reader
 
 from tests.support import processes
 from tests.support.bags import (
+    START_S,
     STORE,
     UP,
     Sent,
     camera_info,
     header,
     message,
+    tf_message,
     tfcompose_without_ros,
     write_bag,
 )
@@ -194,26 +200,118 @@ def test_undeclared_edges_are_dropped_only_on_request(folder: Path) -> None:
     assert not any(b"tag" in each.data for each in messages_of(folder / "right"))
 
 
-def test_mcap_keeps_publish_times_sequences_and_chunk_compression(folder: Path) -> None:
-    write_bag(folder / "drive", RECORDED, messages=OTHERS, compressed=CompressionMode.STORAGE)
-    rebag(folder, "drive/drive.mcap", "right.mcap")
-    rows = []
-    for file in (folder / "drive" / "drive.mcap", folder / "right.mcap"):
-        with file.open("rb") as stream:
-            reader = make_reader(stream)
-            rows.append(
-                [
-                    (channel.topic, each.log_time, each.publish_time, each.sequence, each.data)
-                    for _, channel, each in reader.iter_messages(log_time_order=False)
-                    if not channel.topic.startswith("/tf")
-                ]
-            )
-            summary = reader.get_summary()
-            assert summary
-            assert {chunk.compression for chunk in summary.chunk_indexes} == {"zstd"}
-            names = {record.name: record.metadata for record in reader.iter_metadata()}
-    assert rows[0] == rows[1]
-    assert len(names["tfcompose"]["tfcompose_sha256"]) == 64
+#: An interrupted recording has no index; the library's reader takes messages in their order.
+NO_SUMMARY: dict[str, Any] = {
+    "index_types": IndexType.NONE,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+    "use_statistics": False,
+    "use_summary_offsets": False,
+}
+
+
+def write_mcap(file: Path, **options: Any) -> None:
+    """Write RECORDED and a text after each with the library mcap, as its options are."""
+    with file.open("wb") as stream:
+        writer: Any = Writer(stream, chunk_size=400, **options)
+        writer.start("ros2", "test")
+        ids = {}
+        for topic, kind in (
+            ("/tf", "tf2_msgs/msg/TFMessage"),
+            ("/tf_static", "tf2_msgs/msg/TFMessage"),
+            ("/text", "std_msgs/msg/String"),
+        ):
+            text, _ = STORE.generate_msgdef(kind, ros_version=2)
+            schema = writer.register_schema(kind, "ros2msg", text.encode())
+            ids[topic] = writer.register_channel(topic, "cdr", schema)
+        for number, (topic, at_s, parent, child, stamp_s, xyz, quat) in enumerate(RECORDED):
+            transform = tf_message(parent, child, stamp_s, xyz, quat)
+            for name, kind, content in (
+                (topic, "tf2_msgs/msg/TFMessage", transform),
+                ("/text", "std_msgs/msg/String", message("std_msgs/msg/String", data="x")),
+            ):
+                log_ns = round((START_S + at_s) * 1e9)
+                data = bytes(STORE.serialize_cdr(content, kind))
+                writer.add_message(ids[name], log_ns, data, log_ns - number, number)
+        writer.add_attachment(1, 2, "map.pgm", "image/pgm", b"pixels")
+        writer.add_metadata("route", {"to": "dock"})
+        writer.add_metadata("rosbag2", {"serialized_metadata": "of the old bag"})
+        writer.finish()
+
+
+def records_of(file: Path) -> dict[type, list[Any]]:
+    """Return messages, attachments, metadata and chunks in the order of the file."""
+    records: dict[type, list[Any]] = {Message: [], Attachment: [], Metadata: [], Chunk: []}
+    topics = {}
+    with file.open("rb") as stream:
+        for record in StreamReader(stream, emit_chunks=True).records:
+            inner = breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else ()
+            for each in (record, *inner):
+                if isinstance(each, Channel):
+                    topics[each.id] = each.topic
+                elif isinstance(each, McapMessage):
+                    records[Message].append(
+                        (
+                            topics[each.channel_id],
+                            each.log_time,
+                            each.publish_time,
+                            each.sequence,
+                            each.data,
+                        )
+                    )
+                elif isinstance(each, Attachment):
+                    records[Attachment].append((each.name, each.log_time, each.data))
+                elif isinstance(each, Metadata):
+                    records[Metadata].append((each.name, each.metadata))
+                elif isinstance(each, Chunk):
+                    expanded, size = get_chunk_data_stream(each)
+                    records[Chunk].append((each.data, expanded.read(size)))
+    return records
+
+
+#: Arguments of the library's writer, and whether the recording has chunks.
+LAYOUTS: dict[str, tuple[dict[str, Any], bool]] = {
+    "zstd": ({"compression": CompressionType.ZSTD}, True),
+    "lz4": ({"compression": CompressionType.LZ4}, True),
+    "without a summary": ({**NO_SUMMARY, "compression": CompressionType.NONE}, True),
+    "without chunks": ({"use_chunking": False}, False),
+    "without chunks and a summary": ({**NO_SUMMARY, "use_chunking": False}, False),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_an_mcap_file_keeps_all_but_the_transforms_in_its_layout(
+    folder: Path, layout: str
+) -> None:
+    options, has_chunks = LAYOUTS[layout]
+    write_mcap(folder / "drive.mcap", **options)
+    rebag(folder, "drive.mcap", "right.mcap")
+    before, after = (records_of(folder / name) for name in ("drive.mcap", "right.mcap"))
+    assert after[Message][0][0] == "/tf_static"
+    for kind in (Message, Attachment):
+        kept = [
+            [each for each in records[kind] if not each[0].startswith("/tf")]
+            for records in (before, after)
+        ]
+        assert kept[0] == kept[1]
+        assert kept[0]
+    assert [name for name, _ in after[Metadata]] == ["route", "tfcompose"]
+    chunks = [chunk for chunk in before[Chunk] if b"bracket" not in chunk[1]]
+    assert (len(chunks) > 3) == has_chunks
+    assert set(chunks[2:]) <= set(after[Chunk])
+    with (folder / "right.mcap").open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        ordered = [
+            (channel.topic, each.log_time, each.publish_time, each.sequence, each.data)
+            for _, channel, each in reader.iter_messages()
+        ]
+        summary = reader.get_summary()
+    assert sorted(ordered) == sorted(after[Message])
+    assert summary
+    assert summary.statistics
+    assert summary.statistics.message_count == len(ordered)
+    assert summary.statistics.message_start_time == min(each[1] for each in ordered)
+    assert summary.statistics.message_end_time == max(each[1] for each in ordered)
 
 
 def test_every_file_of_a_split_bag_begins_with_all_fixed_edges(folder: Path) -> None:

@@ -1,60 +1,72 @@
-"""Rewriting of an MCAP file, record by record, with the library ``mcap``."""
+"""Rewriting of an MCAP file, chunk by chunk.
+
+A chunk in which no message changes is written as it is, without compressing it again.
+"""
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from io import BytesIO
+from typing import TYPE_CHECKING
 
+import lz4.frame  # mcap requires it
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Attachment, Chunk, DataEnd, Header, Message, Metadata, Schema
-from mcap.records import Channel as ChannelRecord
-from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, Writer
+from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema, Statistics
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.summary import Summary
 
+from tfcompose.tools.rebag.mcap_writer import HEAD, MAGIC, McapWriter, bytes_of
 from tfcompose.tools.rebag.recorded_topic import TF_HASH, RecordedTopic
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from pathlib import Path
     from typing import BinaryIO
 
-    from mcap.summary import Summary
-
+    from tfcompose.tools.rebag.mcap_writer import MessageIndexes
     from tfcompose.tools.rebag.rewriting import Edit, Rewrite
 
 #: The metadata record in which rosbag2 keeps a copy of metadata.yaml, and the key in it.
 _ROSBAG2, _SERIALIZED = "rosbag2", "serialized_metadata"
 #: The name of tfcompose's metadata record.
 PROVENANCE = "tfcompose"
-_COMPRESSION = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4}
+#: The fields of a message before its data: channel, sequence, log time and publish time.
+_MESSAGE = struct.Struct("<HIQQ")
+#: The place of a message's data in its record.
+_DATA = HEAD.size + _MESSAGE.size
+#: Records that the writer makes itself.
+_NOT_COPIED = frozenset({Opcode.MESSAGE_INDEX, Opcode.DATA_END})
+_COMPRESS: dict[str, Callable[[bytes], bytes]] = {
+    "zstd": zstandard.compress,
+    "lz4": lz4.frame.compress,
+    "": bytes,
+}
 
 
 def rewrite_mcap(source: Path, target: Path, rewrite: Rewrite) -> Counter[str]:
     """Write the corrected copy of an MCAP file, and return the number of messages by topic.
 
-    The copy has the source's chunk size and compression. Messages keep their order, times and
-    sequence numbers.
+    The copy has the source's chunks, compressed in the same way. Messages keep their order, times
+    and sequence numbers.
 
     Raises:
         McapError: if the source is damaged.
         OSError: if a file cannot be read or written.
     """
     with source.open("rb") as old, target.open("wb") as new:
-        summary = make_reader(old).get_summary()
-        old.seek(0)
-        writer = _writer_like(old, new)
-        old.seek(0)
-        file = _McapRewrite(rewrite, writer, summary)
-        for record in StreamReader(old).records:
-            rewrite.go_on()
-            if isinstance(record, DataEnd):
-                break
-            if isinstance(record, Header):
-                writer.start(record.profile, record.library)
-                file.open()
-            else:
-                file.take(record)
-        writer.add_metadata(PROVENANCE, dict(rewrite.provenance))
-        _finish(writer)
+        summary = _complete_summary(old)
+        old.seek(len(MAGIC))
+        file = _McapRewrite(rewrite, McapWriter(new), summary)
+        try:
+            file.copy(old)
+        except struct.error:
+            raise EndOfFile from None
     return file.counts
 
 
@@ -73,123 +85,213 @@ def qos_in_mcap(file: Path) -> dict[str, str]:
     return {each.topic: each.metadata.get("offered_qos_profiles", "") for each in channels}
 
 
-def _finish(writer: Any) -> None:
-    """Finish the file and write its index.
+def _complete_summary(stream: BinaryIO) -> Summary:
+    """Return the summary of a file; read the whole file if its summary lacks channels."""
+    summary = make_reader(stream).get_summary()
+    statistics = summary and summary.statistics
+    if summary and statistics and len(summary.channels) == statistics.channel_count:
+        return summary
+    summary, counts, times_ns = Summary(), Counter[int](), [2**64]
+    stream.seek(0)
+    for record in StreamReader(stream).records:
+        if isinstance(record, Schema):
+            summary.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            summary.channels[record.id] = record
+        elif isinstance(record, Message):
+            counts[record.channel_id] += 1
+            times_ns = [min(*times_ns, record.log_time)]
+    summary.statistics = Statistics(
+        attachment_count=0,
+        channel_count=len(summary.channels),
+        channel_message_counts=counts,
+        chunk_count=0,
+        message_count=counts.total(),
+        message_start_time=times_ns[0],
+        message_end_time=times_ns[0],
+        metadata_count=0,
+        schema_count=len(summary.schemas),
+    )
+    return summary
 
-    The library's method has no type annotations.
+
+def _records_in(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield the opcode of each record with its start and its end.
+
+    Raises:
+        EndOfFile: if the last record is not complete.
     """
-    writer.finish()
+    start = 0
+    while start < len(data):
+        opcode, size = HEAD.unpack_from(data, start)
+        end = start + HEAD.size + size
+        if end > len(data):
+            raise EndOfFile
+        yield opcode, start, end
+        start = end
 
 
-def _writer_like(old: BinaryIO, new: BinaryIO) -> Writer:
-    """Return a writer with the chunk size and the compression of a file."""
-    for record in StreamReader(old, emit_chunks=True).records:
-        if isinstance(record, Chunk):
-            compression = _COMPRESSION.get(record.compression, CompressionType.NONE)
-            return Writer(new, chunk_size=record.uncompressed_size, compression=compression)
-        if isinstance(record, Message):
-            return Writer(new, use_chunking=False)
-        if isinstance(record, DataEnd):
-            break
-    return Writer(new)
+def _recorded_topic(channel: Channel, schema: Schema | None) -> RecordedTopic:
+    if schema is None:
+        return RecordedTopic(channel.topic, "")
+    text = schema.data.decode(errors="replace")
+    return RecordedTopic(channel.topic, schema.name, schema.encoding, text)
 
 
 class _McapRewrite:
     """Copies the records of a file to a writer, with corrections."""
 
-    def __init__(self, rewrite: Rewrite, writer: Writer, summary: Summary | None) -> None:
+    def __init__(self, rewrite: Rewrite, writer: McapWriter, summary: Summary) -> None:
         self._rewrite = rewrite
         self._writer = writer
         self._summary = summary
-        self._schemas: dict[int, tuple[int, Schema | None]] = {0: (0, None)}
-        self._channels: dict[int, tuple[int, str, Edit | None]] = {}
-        #: Ids of channels that were registered for the opening messages, by topic.
-        self._opened: dict[str, int] = {}
-        self._is_open = False
-        self.counts: Counter[str] = Counter()
+        self._edits: dict[int, Edit] = {}
+        for id_, channel in summary.channels.items():
+            edit = rewrite.edit_of(
+                _recorded_topic(channel, summary.schemas.get(channel.schema_id))
+            )
+            if edit:
+                self._edits[id_] = edit
 
-    def open(self) -> None:
-        """Write the opening messages, if the file has a summary with the start time."""
-        statistics = self._summary and self._summary.statistics
-        if statistics and statistics.message_count:
-            self._open_at(statistics.message_start_time)
+    @property
+    def counts(self) -> Counter[str]:
+        """The number of written messages by topic."""
+        counts: Counter[str] = Counter()
+        for id_, count in self._writer.counts.items():
+            counts[self._summary.channels[id_].topic] += count
+        return counts
 
-    def _open_at(self, stamp_ns: int) -> None:
-        self._is_open = True
-        for channel, data in self._rewrite.openings(stamp_ns):
-            id_ = self._opened[channel.topic] = self._register(channel)
-            self._write(channel.topic, id_, data, stamp_ns, stamp_ns, 0)
+    def copy(self, old: BinaryIO) -> None:
+        """Write the corrected file.
 
-    def _register(self, channel: RecordedTopic) -> int:
-        """Register a channel for opening messages; use the file's own channel if there is one."""
-        for recorded in self._summary.channels.values() if self._summary else ():
-            schema = self._summary.schemas.get(recorded.schema_id) if self._summary else None
-            if recorded.topic == channel.topic and schema and schema.name == channel.type:
-                id_ = self._writer.register_schema(schema.name, schema.encoding, schema.data)
-                return int(
-                    self._writer.register_channel(
-                        recorded.topic, recorded.message_encoding, id_, recorded.metadata
-                    )
-                )
-        id_ = self._writer.register_schema(
-            channel.type, channel.encoding, channel.definition.encode()
+        Raises:
+            EndOfFile: if the old one ends too early. struct.error: if a record is too short.
+        """
+        opcode, is_open = None, False
+        while opcode != Opcode.DATA_END:
+            self._rewrite.go_on()
+            head = old.read(HEAD.size)
+            opcode, size = HEAD.unpack(head)
+            end = old.tell() + size
+            if opcode == Opcode.CHUNK:
+                chunk = Chunk.read(ReadDataStream(old))
+                if not is_open:
+                    self._write_chunk(*self._openings(), chunk.compression)
+                self._take_chunk(chunk)
+                is_open = True
+            elif opcode == Opcode.MESSAGE:
+                if not is_open:
+                    self._write_records(*self._openings())
+                self._write_records(*self._corrected(head + old.read(size)))
+                is_open = True
+            elif opcode not in _NOT_COPIED:
+                self._take(opcode, head + old.read(size))
+            old.seek(end)
+        self._writer.add_metadata(Metadata(PROVENANCE, dict(self._rewrite.provenance)))
+        self._writer.finish(self._summary.schemas, self._summary.channels)
+
+    def _take(self, opcode: int, data: bytes) -> None:
+        """Write a record that is neither a chunk nor a message."""
+        stream = ReadDataStream(BytesIO(data[HEAD.size :]))
+        if opcode == Opcode.ATTACHMENT:
+            self._writer.add_attachment(Attachment.read(stream))
+        elif opcode == Opcode.METADATA:
+            record = Metadata.read(stream)
+            if record.name == _ROSBAG2:
+                record.metadata.pop(_SERIALIZED, None)  # it describes the old bag
+            if record.metadata:
+                self._writer.add_metadata(record)
+        else:
+            self._writer.write(data)
+
+    def _take_chunk(self, chunk: Chunk) -> None:
+        stream, size = get_chunk_data_stream(chunk)
+        before = stream.read(size)
+        after, indexes = self._corrected(before)
+        if after is before:
+            self._writer.add_chunk(chunk, indexes)
+        else:
+            self._write_chunk(after, indexes, chunk.compression)
+
+    def _write_records(self, data: bytes, indexes: MessageIndexes) -> None:
+        """Write records outside of chunks."""
+        self._writer.write(data)
+        for id_, entries in indexes.items():
+            self._writer.count(id_, entries[::2])
+
+    def _write_chunk(self, data: bytes, indexes: MessageIndexes, compression: str) -> None:
+        """Write records as a chunk, or outside of chunks if no message is among them."""
+        if not indexes:
+            self._write_records(data, indexes)
+            return
+        times_ns = [time_ns for entries in indexes.values() for time_ns in entries[::2]]
+        chunk = Chunk(
+            compression=compression,
+            data=_COMPRESS[compression](data),
+            message_start_time=min(times_ns),
+            message_end_time=max(times_ns),
+            uncompressed_crc=zlib.crc32(data),
+            uncompressed_size=len(data),
         )
+        self._writer.add_chunk(chunk, indexes)
+
+    def _corrected(self, data: bytes) -> tuple[bytes, MessageIndexes]:
+        """Return corrected records, or the same object if none changes, and their index."""
+        view = memoryview(data)
+        parts: list[bytes | memoryview] = []
+        indexes: MessageIndexes = {}
+        #: End of the records that are in ``parts``, and how much shorter they were before.
+        done, shift = 0, 0
+        for opcode, start, end in _records_in(data):
+            if opcode != Opcode.MESSAGE:
+                continue
+            id_, _, log_time_ns, _ = _MESSAGE.unpack_from(data, start + HEAD.size)
+            edit = self._edits.get(id_)
+            offset = start + shift
+            if edit:
+                before = data[start + _DATA : end]
+                after = edit(before)
+                if after is not before:
+                    parts.append(view[done:start])
+                    done = end
+                    if after is None:
+                        shift -= end - start
+                        continue
+                    parts += (
+                        HEAD.pack(opcode, _MESSAGE.size + len(after)),
+                        view[start + HEAD.size : start + _DATA],
+                        after,
+                    )
+                    shift += len(after) - len(before)
+            indexes.setdefault(id_, []).extend((log_time_ns, offset))
+        return b"".join((*parts, view[done:])) if parts else data, indexes
+
+    def _openings(self) -> tuple[bytes, MessageIndexes]:
+        """Return the opening messages after the channels that they need, and their index."""
+        statistics, data = self._summary.statistics, b""
+        indexes: MessageIndexes = {}
+        stamp_ns = statistics.message_start_time if statistics else 0
+        for topic, message in self._rewrite.openings(stamp_ns):
+            channel = self._channel_of(topic)
+            data += bytes_of(self._summary.schemas[channel.schema_id]) + bytes_of(channel)
+            indexes[channel.id] = [stamp_ns, len(data)]
+            data += bytes_of(Message(channel.id, stamp_ns, message, stamp_ns, 0))
+        return data, indexes
+
+    def _channel_of(self, topic: RecordedTopic) -> Channel:
+        """Return the channel of a topic; add one if the file has none."""
+        schemas, channels = self._summary.schemas, self._summary.channels
+        for channel in channels.values():
+            schema = schemas.get(channel.schema_id)
+            if channel.topic == topic.topic and schema and schema.name == topic.type:
+                return channel
+        text = topic.definition.encode()
+        schema = Schema(max(schemas, default=0) + 1, text, topic.encoding, topic.type)
         metadata = {
-            "offered_qos_profiles": self._rewrite.qos_of(channel.topic),
+            "offered_qos_profiles": self._rewrite.qos_of(topic.topic),
             "topic_type_hash": TF_HASH,
         }
-        return int(self._writer.register_channel(channel.topic, "cdr", id_, metadata))
-
-    def take(self, record: object) -> None:
-        """Write a corrected record; skip records that the writer creates itself."""
-        if isinstance(record, Message):
-            self._take_message(record)
-        elif isinstance(record, Schema):
-            if record.id in self._schemas:  # repeated in each chunk
-                return
-            id_ = self._writer.register_schema(record.name, record.encoding, record.data)
-            self._schemas[record.id] = id_, record
-        elif isinstance(record, ChannelRecord):
-            self._take_channel(record)
-        elif isinstance(record, Attachment):
-            self._writer.add_attachment(
-                record.create_time, record.log_time, record.name, record.media_type, record.data
-            )
-        elif isinstance(record, Metadata):
-            self._take_metadata(record)
-
-    def _take_message(self, message: Message) -> None:
-        if not self._is_open:  # a file without a summary
-            self._open_at(message.log_time)
-        id_, topic, edit = self._channels[message.channel_id]
-        data = edit(message.data) if edit else message.data
-        if data is not None:
-            self._write(topic, id_, data, message.log_time, message.publish_time, message.sequence)
-
-    def _take_channel(self, record: ChannelRecord) -> None:
-        if record.id in self._channels:  # repeated in each chunk
-            return
-        schema_id, schema = self._schemas[record.schema_id]
-        channel = RecordedTopic(record.topic, "")
-        if schema is not None:
-            text = schema.data.decode(errors="replace")
-            channel = RecordedTopic(record.topic, schema.name, schema.encoding, text)
-        id_ = self._opened.pop(record.topic, None)
-        if id_ is None:
-            id_ = self._writer.register_channel(
-                record.topic, record.message_encoding, schema_id, record.metadata
-            )
-        self._channels[record.id] = id_, record.topic, self._rewrite.edit_of(channel)
-
-    def _take_metadata(self, record: Metadata) -> None:
-        entries = dict(record.metadata)
-        if record.name == _ROSBAG2:
-            entries.pop(_SERIALIZED, None)  # it describes the old bag
-        if entries:
-            self._writer.add_metadata(record.name, entries)
-
-    def _write(  # noqa: PLR0913, PLR0917 (the fields of a message)
-        self, topic: str, id_: int, data: bytes, log_ns: int, publish_ns: int, sequence: int
-    ) -> None:
-        self._writer.add_message(id_, log_ns, data, publish_ns, sequence)
-        self.counts[topic] += 1
+        id_ = max(channels, default=0) + 1
+        schemas[schema.id] = schema
+        channels[id_] = Channel(id_, topic.topic, "cdr", metadata, schema.id)
+        return channels[id_]

@@ -90,10 +90,15 @@ def is_checked(file: str) -> bool:
 def language_of(file: str) -> Language | None:
     """Return the language of a tool that the file is in, by its name; None for another file.
 
-    Tools of other packages are looked up only for a file that is no robot file.
+    Tools of other packages are looked up only for a file that is no robot file. A pipe, which can
+    be read once, is one.
     """
+    from tfcompose.foundation.reading import is_file
+
     language = shipped_tools().language_of(file)
-    return language if language or is_robot(file) else installed_tools().language_of(file)
+    if language or not is_file(file) or is_robot(file):
+        return language
+    return installed_tools().language_of(file)
 
 
 def is_robot(file: str) -> bool:

@@ -406,14 +406,14 @@ def test_ctrl_c_before_anything_came_is_no_finding(
     )
 
     def is_none(_: float) -> None:
-        running = [start(*words) for words in commands]
-        for each in running:
-            assert until(partial(has_begun, each.process))
-            code = each.end(signal.SIGINT)
-            each.close()
-            assert (code, each.output) == (130, ""), each.errors
-            assert len(each.errors) <= 1, each.errors
-            assert all(re.match(r"tfcompose: .* \d\.\d s", line) for line in each.errors)
+        for words in commands:
+            started = start(*words)
+            assert until(partial(has_begun, started.process))
+            code = started.end(signal.SIGINT)
+            started.close()
+            assert (code, started.output) == (130, ""), started.errors
+            assert len(started.errors) <= 1, started.errors
+            assert all(re.match(r"tfcompose: .* \d\.\d s", line) for line in started.errors)
 
     at_last(is_none)  # after 2 s it has looked for long enough to say that there is nothing
 

@@ -22,9 +22,10 @@ from tests.tools.rebag.test_rebag import RECORDED, ROBOT
 REMAPPED = ["--remap", "/tf_static:=/tf_static_recorded"]
 #: Writes down its arguments, and plays until SIGINT or for no time.
 PLAYER = f"""#!{sys.executable}
-import json, signal, sys
+import json, os, signal, sys
 signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
-open("player.json", "w").write(json.dumps(sys.argv[1:]))
+open("player.new", "w").write(json.dumps(sys.argv[1:]))
+os.replace("player.new", "player.json")
 if "--loop" in sys.argv:
     signal.pause()
 sys.exit(3)

@@ -14,7 +14,9 @@ from tests.benchmarks.contenders import RCLPY, TFCOMPOSE_ON_ROS
 from tests.benchmarks.fixed_robot import PROGRAMS
 from tests.benchmarks.measures import cpu_s
 from tests.support.waiting import until
+from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.program import HERE
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.model.plan.file import write_plan
 
 if TYPE_CHECKING:
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tests.benchmarks.benchmark import Contender, Opened, Sampler, Workspace
-    from tfcompose.model.plan import Plan
 
 COMPLETE_S, WARM_UP_S = 60.0, 5.0
 
@@ -95,6 +96,35 @@ def opened(
             yield sample
 
     return observed
+
+
+def plan_of(owned: Mapping[str, Sequence[str]], rate: float) -> Plan:
+    """Return the plan of owners in external nodes: frames below base, each sent at that rate."""
+    edges = tuple(
+        PlanEdge(
+            "base",
+            frame,
+            "dynamic",
+            owner,
+            f"/{owner}",
+            pose=Pose(),
+            rate=rate,
+            source=SourceLine("bench.yaml", line),
+        )
+        for line, owner in enumerate(owned)
+        for frame in owned[owner]
+    )
+    owners = (
+        PlanProcess(
+            owner,
+            "external",
+            nodes=(f"/{owner}",),
+            owns=tuple(("base", frame) for frame in frames),
+        )
+        for owner, frames in owned.items()
+    )
+    guarding = PlanProcess("guard", "guard", nodes=("/bench/guard",))
+    return Plan("bench", "0", "base", RosSettings(), edges, (*owners, guarding))
 
 
 def contenders(plan: Plan, owner: Sequence[str | Path], seconds: float) -> dict[Contender, Opened]:

@@ -5,36 +5,10 @@ from __future__ import annotations
 from tests.benchmarks.benchmark import Benchmark, Limit, Row
 from tests.benchmarks.contenders import RCLPY
 from tests.benchmarks.fixed_robot import PROGRAMS
-from tests.benchmarks.guarding import contenders
-from tfcompose.foundation.geometry import Pose
-from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tests.benchmarks.guarding import contenders, plan_of
 
 EDGES, EDGES_A_MESSAGE, RATE = 1000, 100, 50
-
-
-def plan() -> Plan:
-    """Return the plan whose edges the owner sends."""
-    edges = tuple(
-        PlanEdge(
-            "base",
-            f"frame_{n}",
-            "dynamic",
-            "owner",
-            "/owner",
-            pose=Pose(),
-            rate=RATE,
-            source=SourceLine("bench.yaml", n),
-        )
-        for n in range(EDGES)
-    )
-    owns = tuple((edge.parent, edge.child) for edge in edges)
-    processes = (
-        PlanProcess("owner", "external", nodes=("/owner",), owns=owns),
-        PlanProcess("guard", "guard", nodes=("/bench/guard",)),
-    )
-    return Plan("bench", "0", "base", RosSettings(), edges, processes)
-
-
+OWNED = {"owner": [f"frame_{n}" for n in range(EDGES)]}
 OWNER = (PROGRAMS / "owner.py", "base", str(EDGES), str(RATE), str(EDGES_A_MESSAGE))
 BENCHMARK = Benchmark(
     name="guard",
@@ -47,6 +21,6 @@ BENCHMARK = Benchmark(
         ),
         "findings": Row("… false findings in 4 s", "findings", (Limit(0),)),
     },
-    contenders=contenders(plan(), OWNER, seconds=4.0),
+    contenders=contenders(plan_of(OWNED, RATE), OWNER, seconds=4.0),
     runs=5,
 )

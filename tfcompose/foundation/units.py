@@ -18,6 +18,7 @@ from tfcompose.foundation.findings import did_you_mean, slip_of
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
+    from typing_extensions import Self
 
 Dimension = tuple[int, int, int, int]
 
@@ -310,7 +311,14 @@ _LONGEST_SHOWN = 60
 class WithUnit(float):
     """A number in SI that has a unit in the file. A number without a unit is a plain float."""
 
-    __slots__ = ()
+    __slots__ = ("dimension",)
+    dimension: Dimension
+
+    def __new__(cls, value: float, dimension: Dimension = NUMBER) -> Self:
+        """Return the number. ``dimension`` is that of its unit."""
+        number = super().__new__(cls, value)
+        number.dimension = dimension
+        return number
 
 
 #: Above this limit, and below its inverse for sizes and masses, products of four numbers would
@@ -394,7 +402,9 @@ class Measure:
                     f"expected {with_article(dimension)}, not {with_article(value.dimension)}"
                 )
                 raise invalid("TF104", message, f"for example {example(dimension)}")
-            return value.value if value.dimension == NUMBER else WithUnit(value.value)
+            if value.dimension == NUMBER:
+                return value.value
+            return WithUnit(value.value, value.dimension)
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return value
         message = f"{format_value(value)} is not {with_article(self.dimension)}"

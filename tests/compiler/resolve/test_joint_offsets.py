@@ -3,7 +3,9 @@
 import copy
 import json
 import random
+from argparse import ArgumentParser
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,9 @@ import yaml
 from tests.support.random_robot import MOVING, spec
 from tests.support.texts import robot_in
 from tests.support.urdf_readers import Pinocchio, Reader, Yourdfpy
-from tfcompose.cli.compiling import library
-from tfcompose.compiler.compile import compile_robot
+from tfcompose.cli.compiling import compile_file, library
+from tfcompose.cli.options import add_variant
+from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.emit import emit
 from tfcompose.compiler.mounts.kinematics import joint_positions, poses_in_roots
 from tfcompose.model.robot import Robot
@@ -125,3 +128,79 @@ def test_what_a_joint_reports_is_shifted_and_its_range_is_not() -> None:
     assert neck.reference.rising == pytest.approx(9.6 * DEG)
     assert neck.reference.falling is None
     assert (lift.limit.lower, lift.limit.upper) == pytest.approx((-0.003, 0.047))
+
+
+PART = """\
+<robot name="head">
+  <link name="base"/><link name="head"/><link name="ear"/><link name="jaw"/>
+  <joint name="neck" type="revolute"><parent link="base"/><child link="head"/>
+    <origin xyz="0 0 0.5"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <joint name="ear" type="revolute"><parent link="head"/><child link="ear"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+    <mimic joint="neck" multiplier="2" offset="0.1"/></joint>
+  <joint name="jaw" type="prismatic"><parent link="head"/><child link="jaw"/>
+    <axis xyz="0 0 1"/><limit lower="0" upper="0.1" effort="1" velocity="1"/></joint>
+</robot>
+"""
+HUMANOID = """\
+tfcompose: 1
+robot: humanoid
+links: {torso: {}, hat: {}}
+parts:
+  head: {xacro: head.xacro, prefix: r_, parent: torso}
+joints:
+  hat: {type: continuous, parent: r_head, child: hat, mimic: {joint: r_neck, multiplier: 3}}
+"""
+
+
+@pytest.fixture
+def humanoid(tmp_path: Path) -> Callable[[str], Compiled]:
+    """Return a function that compiles a robot whose head is xacro, with an overlay."""
+    (tmp_path / "head.xacro").write_text(PART)
+    (tmp_path / "robot.yaml").write_text(HUMANOID)
+    parser = ArgumentParser()
+    add_variant(parser)
+
+    def compile_with(overlay: str) -> Compiled:
+        (tmp_path / "unit7.yaml").write_text(overlay)
+        options = parser.parse_args(["--overlay", str(tmp_path / "unit7.yaml")])
+        options.arg_values = {}
+        return compile_file(str(tmp_path / "robot.yaml"), options)
+
+    return compile_with
+
+
+def test_an_overlay_corrects_a_joint_of_a_part(humanoid: Callable[[str], Compiled]) -> None:
+    robot = humanoid("joints: {r_neck: {offset: 10 deg}, r_jaw: {offset: 2 mm}}\n").robot
+    exact = humanoid("{}\n").robot
+    assert robot
+    assert exact
+    reported = {"r_neck": 0.3, "r_jaw": 0.01}
+    positions = {"r_neck": 0.3 + 10 * DEG, "r_jaw": 0.012}
+    exact_poses = poses_in_roots(exact, joint_positions(exact, positions))
+    for frame, pose in poses_in_roots(robot, joint_positions(robot, reported)).items():
+        assert pose.xyz == pytest.approx(exact_poses[frame].xyz, abs=FAR_M), frame
+        assert pose.quat_xyzw == pytest.approx(exact_poses[frame].quat_xyzw), frame
+    joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
+    neck = joints["r_neck"]
+    assert neck.limit
+    assert (neck.limit.lower, neck.zero_offset) == pytest.approx((-1 - 10 * DEG, 10 * DEG))
+    assert joints["r_ear"].zero_offset == 0
+
+
+@pytest.mark.parametrize(
+    ("joint", "code", "column"),
+    [
+        ("neck: {offset: 1 deg}", "TF703", 10),
+        ("r_neck: {offset: 1 mm}", "TF104", 27),
+        ("r_jaw: {offset: 1 deg}", "TF104", 26),
+    ],
+)
+def test_an_offset_of_no_joint_or_with_another_unit_is_reported(
+    joint: str, code: str, column: int, humanoid: Callable[[str], Compiled]
+) -> None:
+    (finding,) = humanoid(f"joints: {{{joint}}}\n").errors
+    assert finding.span
+    assert (finding.code, Path(finding.span.file).name) == (code, "unit7.yaml")
+    assert (finding.span.line, finding.span.column) == (1, column)

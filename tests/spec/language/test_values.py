@@ -19,6 +19,7 @@ from tfcompose.foundation.units import (
 )
 from tfcompose.spec.language import Validated, compose, validate
 from tfcompose.spec.language.expressions import ExpressionError, evaluate
+from tfcompose.spec.language.robot import JointSpec
 from tfcompose.spec.load import load
 
 HEAD = "tfcompose: 1\nrobot: r\n"
@@ -392,7 +393,9 @@ def test_a_joint_limit_takes_the_units_of_its_motion(
         f" {limit}}}}}\n"
     )
     validated = validate(compose(load(text, "f")))
-    output = validated.spec.joints["j"].limit
+    joint = validated.spec.joints["j"]
+    assert isinstance(joint, JointSpec)
+    output = joint.limit
     assert output
     assert not validated.findings
     assert (output.velocity, output.effort) == pytest.approx((velocity, effort))

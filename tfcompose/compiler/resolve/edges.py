@@ -26,7 +26,7 @@ from tfcompose.model.robot import (
     SourceNumbers,
     is_optical,
 )
-from tfcompose.spec.language.robot import JointSpec
+from tfcompose.spec.language.robot import JointSpec, JointZeroSpec
 from tfcompose.spec.language.spec import Spec
 
 if TYPE_CHECKING:
@@ -61,6 +61,8 @@ def add_links(draft: Draft) -> Iterator[Finding]:
 def add_joints(draft: Draft) -> Iterator[Finding]:
     """Add the joints' edges to the draft."""
     for name, joint in draft.spec.joints.items():
+        if isinstance(joint, JointZeroSpec):
+            continue
         yield from _idle_joint_keys(name, joint, draft.spec)
         yield from add_edge(draft, ("joints", name), joint.child, joint, joint_name=name)
 

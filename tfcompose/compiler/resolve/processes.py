@@ -44,6 +44,7 @@ from tfcompose.spec.language.process import (
     StopSpec,
     keys_of,
 )
+from tfcompose.spec.language.robot import JointZeroSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -131,7 +132,7 @@ def _declared_rate(owner: str, spec: RobotSpec) -> float:
         entry.rate
         for section in sections
         for entry in section.values()
-        if entry.owner == owner and entry.rate
+        if not isinstance(entry, JointZeroSpec) and entry.owner == owner and entry.rate
     ]
     return max(rates, default=_USUAL_RATE_HZ)
 

@@ -44,6 +44,7 @@ from tfcompose.compiler.resolve.tool_sections import (
     as_sections,
     check_sections,
 )
+from tfcompose.compiler.resolve.zeros import correct_parts
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.model.robot import Edge, Process, Robot
 from tfcompose.spec.language.pose import MountKeys
@@ -233,6 +234,7 @@ PASSES: tuple[Pass, ...] = (
     add_joints,
     add_sensors,
     add_parts,
+    correct_parts,
     measure_mounts,
     solve_poses,
     check_texts,

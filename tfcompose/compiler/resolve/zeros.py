@@ -18,20 +18,31 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.spec.language.robot import JointSpec
+from tfcompose.foundation.findings import did_you_mean, finding
+from tfcompose.foundation.text import list_names
+from tfcompose.foundation.units import ANGLE, LENGTH, WithUnit, example, with_article
+from tfcompose.spec.language.robot import JointSpec, JointZeroSpec
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from tfcompose.compiler.resolve.draft import Draft
+    from tfcompose.foundation.findings import Finding
     from tfcompose.model.robot import Edge, Joint
     from tfcompose.spec.language.pose import EdgeKeys
+
+#: Number of joints that a finding lists.
+_LISTED = 12
 
 
 def with_zero_offset(edge: Edge, keys: EdgeKeys | None) -> Edge:
     """Return the edge with the offset that its keys give the zero of its joint."""
-    joint = edge.joint
-    if joint is None or not isinstance(keys, JointSpec) or not keys.offset:
+    if edge.joint is None or not isinstance(keys, JointSpec) or not keys.offset:
         return edge
-    offset = float(keys.offset)
+    return _corrected(edge, edge.joint, float(keys.offset))
+
+
+def _corrected(edge: Edge, joint: Joint, offset: float) -> Edge:
     return replace(
         edge, pose=edge.pose @ joint.motion(offset), joint=_with_reported(joint, offset)
     )
@@ -52,7 +63,8 @@ def _with_reported(joint: Joint, offset: float) -> Joint:
     if switch:
         rising, falling = _reported(switch.rising, offset), _reported(switch.falling, offset)
         switch = replace(switch, rising=rising, falling=falling)
-    return replace(joint, zero_offset=offset, limit=limit, safety=safety, reference=switch)
+    zero_offset = joint.zero_offset + offset
+    return replace(joint, zero_offset=zero_offset, limit=limit, safety=safety, reference=switch)
 
 
 def _reported(position: float | None, offset: float) -> float | None:
@@ -71,3 +83,51 @@ def correct_mimics(draft: Draft) -> None:
         if correction:
             joint = replace(joint, offset=joint.offset + correction)
             draft.edges[index] = replace(edge, joint=joint)
+
+
+def correct_parts(draft: Draft) -> Iterator[Finding]:
+    """Apply the offsets that this file gives the joints of its parts, and report unknown joints.
+
+    A part's own offset, and what its joints mimic, is already in its edges.
+    """
+    offsets = {
+        name: entry.offset
+        for name, entry in draft.spec.joints.items()
+        if isinstance(entry, JointZeroSpec)
+    }
+    if not offsets:
+        return
+    apart = {part.name for part in draft.joined if part.declared.is_alone}
+    moving: dict[str, Joint] = {}
+    for index, edge in enumerate(draft.edges):
+        joint = edge.joint
+        if joint is None or edge.entry[:1] != ("parts",) or edge.entry[1] in apart:
+            continue
+        moving[joint.name] = joint
+        correction = joint.multiplier * offsets.get(joint.mimic or "", 0.0)
+        if correction:
+            joint = replace(joint, offset=joint.offset + correction)
+        draft.edges[index] = _corrected(edge, joint, float(offsets.get(joint.name, 0.0)))
+    for name, offset in offsets.items():
+        yield from _check_offset(draft, name, offset, moving)
+
+
+def _check_offset(
+    draft: Draft, name: str, offset: float, moving: Mapping[str, Joint]
+) -> Iterator[Finding]:
+    """Yield a finding if no part has this moving joint, or its positions have another unit."""
+    spec, path = draft.spec, ("joints", name)
+    if name not in moving:
+        broken = any(section == "parts" for section, *_ in draft.broken)
+        if not broken:
+            has = f"the parts have {list_names(moving, _LISTED)}" if moving else "no part has one"
+            advice = did_you_mean(name, [*moving, *draft.joints], has)
+            yield finding("TF703", f"no moving joint {name}", spec.key_span(path), help=advice)
+        return
+    expected = LENGTH if moving[name].type == "prismatic" else ANGLE
+    if isinstance(offset, WithUnit) and offset.dimension != expected:
+        moves = "slides" if expected == LENGTH else "turns"
+        what = with_article(offset.dimension)
+        message = f"a {moving[name].type} joint {moves}: offset cannot be {what}"
+        span = spec.span_of((*path, "offset"))
+        yield finding("TF104", message, span, help=f"for example {example(expected)}")

@@ -184,6 +184,26 @@ class JointSpec(EdgeKeys):
                     yield from _wrong_unit(kind, path, number, measure)
 
 
+class JointZeroSpec(Spec):
+    """A correction of a joint that a part has."""
+
+    offset: JointPosition = key(..., "correction of the joint's zero", "0.4 deg")
+
+
+def _is_zero(entry: Any) -> bool:
+    """Return whether an entry of ``joints`` corrects a joint of a part, instead of adding one."""
+    return isinstance(entry, JointZeroSpec) or (
+        isinstance(entry, dict) and entry.keys() == {"offset"}
+    )
+
+
+#: A joint, or the correction of a part's.
+JointEntry = Annotated[
+    Annotated[JointSpec, Tag("[joint]")] | Annotated[JointZeroSpec, Tag("[zero]")],
+    Discriminator(lambda entry: "[zero]" if _is_zero(entry) else "[joint]"),
+]
+
+
 def _wrong_unit(
     kind: str, path: Path, value: str | Quantity, measure: Measure
 ) -> Iterator[tuple[Path, PydanticCustomError]]:
@@ -574,9 +594,9 @@ class RobotSpec(Spec):
         "bodies, with URDF's terms",
         {"base_link": {"visual": {"box": [0.5, 0.4, 0.15]}, "collision": "same"}},
     )
-    joints: dict[str, JointSpec] = key(
+    joints: dict[str, JointEntry] = key(
         {},
-        "edges between bodies, with URDF's terms",
+        "edges between bodies, with URDF's terms; offset alone corrects the joint of a part",
         {
             "lift_joint": {
                 "type": "prismatic",

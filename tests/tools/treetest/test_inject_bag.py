@@ -8,7 +8,8 @@ from tests.support.bags import START_S, UP, Sent, drive, write_bag
 from tests.support.cli import tfcompose_in
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.bags import Recording
-from tfcompose.tools.treetest.cases import Case, CaseLoader
+from tfcompose.tools.treetest.case import Case
+from tfcompose.tools.treetest.cases import CaseLoader
 from tfcompose.tools.treetest.faults import inject
 from tfcompose.tools.treetest.running import run_case
 

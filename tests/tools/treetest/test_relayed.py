@@ -11,7 +11,8 @@ from tfcompose.launcher.preflight import LAUNCH
 from tfcompose.model.plan import Plan
 from tfcompose.tf.bags import RecordedMessage
 from tfcompose.tf.ros.tf_codec import Row
-from tfcompose.tools.treetest.cases import Case, CaseLoader
+from tfcompose.tools.treetest.case import Case
+from tfcompose.tools.treetest.cases import CaseLoader
 from tfcompose.tools.treetest.faults import inject
 from tfcompose.tools.treetest.relay_request import RelayRequest, published_topics, redirect
 from tfcompose.tools.treetest.relayed_messages import RelayedMessages

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from argparse import Namespace
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,12 +16,13 @@ from tfcompose.foundation.reading import is_folder
 from tfcompose.spec.load import find_path, load
 from tfcompose.tf.bags import BagError, Recording
 from tfcompose.tools.treetest import ENDINGS
+from tfcompose.tools.treetest.case import Case, variant_of
 from tfcompose.tools.treetest.injections import split_pair
 from tfcompose.tools.treetest.relayed_plan import find_obstacles
 from tfcompose.tools.treetest.spec import SuiteSpec, validate_suite
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterator
     from datetime import date
 
     from tfcompose.foundation.findings import Finding, Span
@@ -31,42 +31,6 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path as SpecPath
     from tfcompose.spec.load import Source
     from tfcompose.tools.treetest.injections import InjectionSpec
-    from tfcompose.tools.treetest.spec import CaseSpec
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A case, ready to run."""
-
-    spec: CaseSpec
-    source: Source
-    #: The text of the test file.
-    text: str
-    #: Where the case is in its file.
-    path: SpecPath
-    plan: Plan
-    #: The robot file.
-    robot: str
-    #: The path of the recording; None: the robot is started.
-    bag: str | None
-    #: Whether xacro files may run outside of the sandbox.
-    trust: bool
-    #: The path of the golden recording; None: there is none.
-    golden: str | None = None
-
-    @property
-    def file(self) -> str:
-        """The test file."""
-        return self.source.file
-
-    def span(self, *steps: str | int) -> Span:
-        """Return the place of a key below the case, or of the nearest one around it."""
-        path = (*self.path, *steps)
-        return self.source.key_span(path) if self.source.has_key(path) else self.value_span(*steps)
-
-    def value_span(self, *steps: str | int) -> Span:
-        """Return the place of a value below the case."""
-        return self.source.span_of((*self.path, *steps))
 
 
 def files_in(name: str) -> list[str]:
@@ -169,21 +133,6 @@ def check_file(request: FileToCheck) -> list[Finding]:
     except RejectedError as error:
         return list(error.findings)
     return []
-
-
-def variant_of(profiles: Iterable[str], *, trust: bool, starts: bool) -> Namespace:
-    """Return the arguments with which a robot file is compiled.
-
-    ``trust``: xacro files may run outside of the sandbox. ``starts``: the robot is started here.
-    """
-    return Namespace(
-        profiles=list(profiles),
-        overlays=[],
-        settings=[],
-        arg_values={},
-        trust=trust,
-        by_hostname=starts,
-    )
 
 
 def _recording(name: str, span: Span) -> tuple[str, date | None]:

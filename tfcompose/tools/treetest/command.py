@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.signals import Stop
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.judging import CaseResult
 
 FAILING = frozenset({"error"})

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from tfcompose.tf.live.edges import TreeObserver
     from tfcompose.tf.ros.tf_codec import Row
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.replay import MessageLog
 
     Topics = tuple[str, str]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.tf.ros.tf_codec import Row
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.replay import Arrival
 
     Topics = tuple[str, str]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from tfcompose.model.plan import Plan
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.injections import InjectionSpec, PublishSpec
     from tfcompose.tools.treetest.setup import LiveSetup
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.plan import JointType, PlanEdge
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.replay import Arrival
     from tfcompose.tools.treetest.spec import JointExpectation
 

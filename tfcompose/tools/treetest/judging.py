@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.signals import Stop
     from tfcompose.model.plan import PlanEdge
     from tfcompose.tf.live.edges import EdgeState
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.spec import EdgeExpectation, FindingExpectation
 
     Topics = tuple[str, str]

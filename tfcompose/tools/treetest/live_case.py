@@ -24,7 +24,7 @@ from tfcompose.launcher.program import HERE
 from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.model.plan.topics import joint_states_topics
 from tfcompose.tf.ros.environment import RosError, child_environment, ros_trouble
-from tfcompose.tools.treetest.cases import variant_of
+from tfcompose.tools.treetest.case import variant_of
 from tfcompose.tools.treetest.inject_live import InjectionError, Injections
 from tfcompose.tools.treetest.judging import CaseJudge
 from tfcompose.tools.treetest.processes import end_process
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.tf.live.ros_feed import RosFeed
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
 
 #: Time until the first transform, and from it until the tree is complete, in seconds; a tree that
 #: is not complete by then is judged as it is.

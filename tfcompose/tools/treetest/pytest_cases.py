@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
 
 
 class CaseFile(pytest.File):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.signals import Stop
-    from tfcompose.tools.treetest.cases import Case
+    from tfcompose.tools.treetest.case import Case
 
 #: How often the end of a case's process is checked, in seconds.
 _CHECK_EVERY_S = 0.05

@@ -10,7 +10,7 @@ import msgspec
 from tfcompose.foundation.findings import Finding
 from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.spec.load import load
-from tfcompose.tools.treetest.cases import Case
+from tfcompose.tools.treetest.case import Case
 from tfcompose.tools.treetest.spec import SuiteSpec, validate_suite
 
 if TYPE_CHECKING:

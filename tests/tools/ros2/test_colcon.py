@@ -73,7 +73,7 @@ def test_colcon_tests_the_installed_robots_alone(workspace: Workspace) -> None:
     finally:
         robot.unlink()
     assert result.returncode == 1
-    assert f"Summary: {count} tests, 0 errors, 1 failure, 0 skipped" in result.stdout
+    assert f"Summary: {count} tests, 0 errors, 2 failures, 0 skipped" in result.stdout
     assert f"{robot}:3:22: error[TF203]" in result.stdout
 
 

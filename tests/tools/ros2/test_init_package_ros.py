@@ -27,7 +27,7 @@ if COLCON is None:
 pytestmark = [
     pytest.mark.ros,
     pytest.mark.slow,
-    pytest.mark.xdist_group("colcon"),
+    pytest.mark.xdist_group("colcon package"),
     needs_ros2_launch,
 ]
 ros2_launch = _fixture
@@ -45,6 +45,8 @@ cases:
     bag: ../run_17
     expect: {pose: {base_link → imu_link: {xyz: [0, 0, 0.1]}}}
 """
+ROBOT_FILE = ("rover.tfc.yaml", "demo:=true")
+LAUNCH_FILE = ("bringup.launch.xml", "profile:=demo")
 IMU: Sent = ("/tf_static", 0.0, "base_link", "imu_link", 0.0, (0.0, 0.0, 0.1), UP)
 
 
@@ -55,6 +57,8 @@ class Package(NamedTuple):
     results: Path
     #: Whether the Python that runs pytest has tfcompose, and with it the plug-in.
     has_plugin: bool
+    #: The file that ``ros2 launch`` starts, and its argument.
+    launch: tuple[str, str]
 
     @property
     def folder(self) -> Path:
@@ -76,20 +80,20 @@ class Package(NamedTuple):
 @pytest.fixture(
     scope="module",
     params=[
-        ((), (), True),
-        ((), ("--symlink-install",), False),
-        (("--cmake",), ("--cmake-args", PREFIX), False),
-        (("--cmake",), ("--symlink-install", "--cmake-args", PREFIX), True),
+        ((), (), True, ROBOT_FILE),
+        ((), ("--symlink-install",), False, LAUNCH_FILE),
+        (("--cmake",), ("--cmake-args", PREFIX), False, LAUNCH_FILE),
+        (("--cmake",), ("--symlink-install", "--cmake-args", PREFIX), True, LAUNCH_FILE),
     ],
     ids=["python", "python linked", "cmake", "cmake linked"],
 )
 def package(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Package:
-    init, build, has_plugin = request.param
+    init, build, has_plugin, launch = request.param
     workspace = Workspace(tmp_path_factory.mktemp("package") / "ws")
     results = workspace.folder / "build" / "rover_bringup" / "pytest.xml"
     if init:
         results = results.parent / "test_results" / "rover_bringup" / "robots.xunit.xml"
-    made = Package(workspace, results, has_plugin)
+    made = Package(workspace, results, has_plugin, launch)
     done = tfcompose_in(workspace.source, "init", "rover", "--package", "rover_bringup", *init)
     assert done.returncode == 0, done.stderr
     write_bag(made.folder / "run_17", [IMU])
@@ -121,16 +125,11 @@ def test_it_is_green_and_red_after_mistakes(package: Package) -> None:
     assert "test/rover.test.yaml:5:21: error[TF931]" in red.stdout
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [("rover.tfc.yaml", "demo:=true"), ("bringup.launch.xml", "profile:=demo")],
-    ids=["robot file", "launch file"],
-)
-def test_ros2_launch_starts_the_robot(
-    package: Package, arguments: tuple[str, ...], ros2_launch: Ros2Launch
-) -> None:
+def test_ros2_launch_starts_the_robot(package: Package, ros2_launch: Ros2Launch) -> None:
+    """By the robot file in one layout, and in the others by the launch file that includes it."""
     installed = package.workspace.folder / "install" / "rover_bringup"
+    assert (installed / "share" / "rover_bringup" / "launch" / "bringup.launch.xml").is_file()
     prefixes = f"{installed}{os.pathsep}{os.environ['AMENT_PREFIX_PATH']}"
-    launch = ros2_launch("rover_bringup", *arguments, AMENT_PREFIX_PATH=prefixes)
+    launch = ros2_launch("rover_bringup", *package.launch, AMENT_PREFIX_PATH=prefixes)
     launch.until_says("tree complete")
     assert launch.end() == 0, launch.output

@@ -153,7 +153,7 @@ def test_no_name_of_a_test_is_longer_than_a_claim() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_830,
+    "foundation": 1_840,
     "model": 2_030,
     "spec": 5_345,
     "compiler": 10_925,
@@ -161,7 +161,7 @@ MOST_STATEMENTS = {
     "guard": 4_553,
     "launcher": 4_280,
     "cli": 6_200,
-    "tools": 20_400,
+    "tools": 19_700,
 }
 
 

@@ -37,7 +37,7 @@ NOT_OF_A_LINE |= {"TF023"}
 #: Of what is measured: tests/tools/prove.
 NOT_OF_A_LINE |= {"TF650", "TF651", "TF652", "TF653", "TF654"}
 #: Of adjusted mounts: tests/tools/adjust.
-NOT_OF_A_LINE |= {f"TF{number}" for number in range(660, 668)}
+NOT_OF_A_LINE |= {f"TF{number}" for number in range(660, 669)}
 #: Of what is imported: tests/tools/importers/test_shell.py.
 NOT_OF_A_LINE |= {"TF020"}
 #: Codes of the running robot, of its plan and of its surroundings.

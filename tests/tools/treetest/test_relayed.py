@@ -133,6 +133,11 @@ def test_a_setup_gives_the_same_case(tmp_path: Path) -> None:
             ("/mine/tf", "/tf_static"),
             ["/bin/node", "x", "--ros-args"],
         ),
+        (  # ROS applies the first
+            ["/bin/node", "--ros-args", "-r", "/tf:=/mine/tf", "-r", "/tf:=/last/tf"],
+            ("/mine/tf", "/tf_static"),
+            ["/bin/node", "--ros-args"],
+        ),
     ],
 )
 def test_a_command_publishes_for_its_relay(

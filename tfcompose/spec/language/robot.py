@@ -197,10 +197,24 @@ def _is_zero(entry: Any) -> bool:
     )
 
 
+class _JointForms:
+    """JSON Schema of an entry of ``joints``: validators name the wrong key, as for one model."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: Any, handler: Any) -> dict[str, Any]:
+        joint, zero = handler(schema)["anyOf"]
+        return {
+            "if": {"required": ["offset"], "maxProperties": 1},
+            "then": zero,
+            "else": joint,
+        }
+
+
 #: A joint, or the correction of a part's.
 JointEntry = Annotated[
     Annotated[JointSpec, Tag("[joint]")] | Annotated[JointZeroSpec, Tag("[zero]")],
     Discriminator(lambda entry: "[zero]" if _is_zero(entry) else "[joint]"),
+    _JointForms,
 ]
 
 

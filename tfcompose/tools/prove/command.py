@@ -1,11 +1,10 @@
 """Compare declared mounts with what sensors measure.
 
-Read messages of the running robot or of a recording, and compare them with the mounts that FILE
-declares. Each check agrees, differs, or cannot tell, for example because the robot moved too
-little. The checks of gravity and yaw rate need an IMU; the check of the yaw rate also needs
-odometry while the robot drives curves. The checks of floor, height and heading need a lidar or a
-depth camera. Check that every message has the frame that the file declares. Name sensors to check
-only these.
+Read messages of the running robot or of a recording, and compare them with the mounts that the
+robot file declares. Each check agrees, differs, or cannot tell, for example because the robot
+moved too little. IMUs are compared with gravity and odometry, lidars and depth cameras with the
+floor, the robot's motion and one another. Check that every message has the frame that the file
+declares. Name sensors to check only these.
 """
 
 from __future__ import annotations

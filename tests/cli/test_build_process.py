@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +19,7 @@ import pytest
 from tests.support import processes
 from tests.support.robots import ROVER
 from tests.support.waiting import TIMEOUT_S, gone, until
+from tfcompose.cli.build_process import BuildProcess
 
 pytestmark = pytest.mark.ros
 
@@ -103,3 +105,21 @@ def test_an_interrupt_during_a_forked_build_ends_both_and_prints_nothing(
     ended = processes.run(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path})
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
     assert not (tmp_path / "build" / "rover" / "plan.json").exists()
+
+
+def test_a_ctrl_c_while_the_build_is_waited_for_is_no_other_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It comes after the kernel has given the exit code, and before that is known."""
+    (tmp_path / "rover.yaml").write_text("{tfcompose: 1, robot: rover", "utf-8")
+    arguments = Namespace(file=str(tmp_path / "rover.yaml"), output=None)
+    waitpid = os.waitpid
+
+    def wait(pid: int, options: int) -> tuple[int, int]:
+        monkeypatch.undo()
+        waitpid(pid, options)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "waitpid", wait)
+    with pytest.raises(KeyboardInterrupt), BuildProcess(arguments) as build:
+        build.wait_until_built()

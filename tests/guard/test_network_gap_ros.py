@@ -84,7 +84,8 @@ def computers(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Comput
     with Computers(tmp_path, ("brain", "rear")) as both:
         for name, computer in both.computers.items():
             (computer.home / "robot.yaml").write_text(ROBOT.replace("MODE", request.param))
-            assert up(both, name).returncode == 0
+            started = up(both, name)
+            assert started.returncode == 0, started.stderr
         assert until(lambda: not wrong(both))
         yield both
         for name in both.computers:

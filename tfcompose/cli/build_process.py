@@ -59,8 +59,10 @@ class BuildProcess:
             self._interrupt()
 
     def _interrupt(self) -> None:
-        os.kill(self._pid, signal.SIGINT)
-        self._exit_code()
+        # A Ctrl-C can come when the child was waited for, and before that is known here.
+        with contextlib.suppress(ProcessLookupError, ChildProcessError):
+            os.kill(self._pid, signal.SIGINT)
+            self._exit_code()
 
     def wait_until_built(self) -> tuple[Path, list[Finding]]:
         """Wait for the build to end; return its plan file and the warnings it printed.

@@ -90,7 +90,7 @@ def test_ctrl_c_completes_the_recording(robot: Path, domain: Domain) -> None:
     assert not list(robot.glob(".run.*"))
     with Reader(robot / "run") as reader:
         assert reader.message_count
-        assert "/tf" in reader.topics
+        assert reader.topics.keys() & {"/tf", "/tf_static"}, "Ctrl-C may come before the first /tf"
 
 
 def test_silence_leaves_no_recording(tmp_path: Path, domain: Domain) -> None:

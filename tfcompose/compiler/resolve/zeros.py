@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.findings import did_you_mean, finding
-from tfcompose.foundation.text import list_names
+from tfcompose.compiler.urdf.blocks import unknown_joint
+from tfcompose.foundation.findings import finding
 from tfcompose.foundation.units import ANGLE, LENGTH, WithUnit, example, with_article
 from tfcompose.spec.language.robot import JointSpec, JointZeroSpec
 
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.robot import Edge, Joint
     from tfcompose.spec.language.pose import EdgeKeys
-
-#: Number of joints that a finding lists.
-_LISTED = 12
 
 
 def with_zero_offset(edge: Edge, keys: EdgeKeys | None) -> Edge:
@@ -120,9 +117,7 @@ def _check_offset(
     if name not in moving:
         broken = any(section == "parts" for section, *_ in draft.broken)
         if not broken:
-            has = f"the parts have {list_names(moving, _LISTED)}" if moving else "no part has one"
-            advice = did_you_mean(name, [*moving, *draft.joints], has)
-            yield finding("TF703", f"no moving joint {name}", spec.key_span(path), help=advice)
+            yield unknown_joint(name, spec.key_span(path), [*moving, *draft.joints])
         return
     expected = LENGTH if moving[name].type == "prismatic" else ANGLE
     if isinstance(offset, WithUnit) and offset.dimension != expected:

@@ -51,10 +51,12 @@ DRIVE, STATIC, CAMERA, JOINTS, OTHER = (
 @pytest.fixture
 def plan(edge: Callable[..., PlanEdge]) -> Plan:
     wheel = PlanJoint("wheel_joint", "continuous", (0.0, 0.0, 1.0))
+    lift = PlanJoint("lift_joint", "prismatic", (0.0, 0.0, 1.0))
     edges = (
         replace(edge("odom base", "drive"), rate=10.0),
         edge("base laser", pose=LASER),
         edge("base wheel", "joints", Pose((0.0, 0.2, 0.0)), wheel),
+        edge("base lift", "joints", Pose((0.0, 0.0, 0.5)), lift),
         replace(edge("camera lens", "camera", Pose((0.0, 0.015, 0.0))), kind="static"),
         replace(edge("base rack", "other", Pose((1.0, 0.0, 0.0))), kind="static"),
     )
@@ -86,6 +88,12 @@ class Tree:
                 "node": JOINTS,
                 "rate": 10.0,
                 "pose": Pose((0.0, 0.2, 0.0), (0, 0, 1, 0)),
+            },
+            "lift": {
+                "parent": "base",
+                "node": JOINTS,
+                "rate": 10.0,
+                "pose": Pose((0.0, 0.0, 0.9)),
             },
             "lens": {
                 "parent": "camera",
@@ -220,7 +228,24 @@ DIFFERENCES: dict[str, tuple[str, dict[str, Any] | None, str, tuple[str, ...]]] 
         (" 90 deg: ",),
     ),
     "another owner's": ("rack", {"pose": Pose((1.1, 0.0, 0.0))}, "TF846", ("rack", " 100 mm: ")),
-    "a joint's place": ("wheel", {"pose": Pose((0.0, 0.25, 0.0))}, "TF846", (" 50 mm:",)),
+    "a joint's place": (
+        "wheel",
+        {"pose": Pose((0.0, 0.25, 0.0), quat_from_rpy(0, 0, 2))},
+        "TF846",
+        (" 50 mm:",),
+    ),
+    "off a joint's axis": (
+        "wheel",
+        {"pose": Pose((0.0, 0.2, 0.0), quat_from_rpy(math.radians(3), 0, 2))},
+        "TF846",
+        (" 3 deg:",),
+    ),
+    "aside of a prismatic joint": (
+        "lift",
+        {"pose": Pose((0.004, 0.0, 0.9))},
+        "TF846",
+        (" 4 mm:",),
+    ),
     "other topic": (
         "laser",
         {"rate": 1.0, "static": False},
@@ -503,7 +528,7 @@ def test_edges_are_searched_on_the_topics_of_their_owners(plan: Plan) -> None:
     )
     topics = {pair: [edge.child for edge in part.edges] for pair, part in parts_of(plan).items()}
     assert topics == {
-        TOPICS: ["base", "wheel", "lens", "rack"],
+        TOPICS: ["base", "wheel", "lift", "lens", "rack"],
         ("/r1/tf", "/r1/tf_static"): ["laser"],
     }
 

@@ -416,27 +416,27 @@ def pose_differs(
     ``off`` has each edge with the sent parent and pose. ``publisher`` is empty if unknown.
     ``span`` is the first edge's place in the robot file.
     """
-    (edge, parent, pose), *further = off
+    (first, parent, deviation), *further = [
+        (edge, parent, _deviation(edge, pose)) for edge, parent, pose in off
+    ]
     by = f" from {publisher}" if publisher else ""
     more = f", and of {plural(len(further), 'more frame')} too" if further else ""
-    message = (
-        f"the pose of {edge.child} in {parent}{by} is off by"
-        f" {offset_of(edge.pose, pose).text}{more}"
-    )
+    message = f"the pose of {first.child} in {parent}{by} is off by {deviation[0]}{more}"
     notes = [
-        Note(
-            f"{edge.child} in {above} by {offset_of(edge.pose, sent).text}:"
-            f" {compare(edge.pose, sent)}"
-        )
-        for edge, above, sent in further[:LISTED_AT_MOST]
+        Note(f"{edge.child} in {above} by {far}: {poses}")
+        for edge, above, (far, poses) in further[:LISTED_AT_MOST]
     ]
     notes += (
-        [] if span else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
+        [] if span else [Note(f"{first.name} is declared in {first.source[0]}:{first.source[1]}")]
     )
     advice = (
         "if the file changed after the start, run tfcompose up again: it restarts the processes"
         " that differ; otherwise correct the wrong one"
     )
-    return finding(
-        "TF846", f"{message}: {compare(edge.pose, pose)}", span, notes=notes, help=advice
-    )
+    return finding("TF846", f"{message}: {deviation[1]}", span, notes=notes, help=advice)
+
+
+def _deviation(edge: PlanEdge, pose: Pose) -> tuple[str, str]:
+    """Return how far a pose is from the nearest expected one, and both poses, as texts."""
+    expected = edge.nearest_pose(pose)
+    return offset_of(expected, pose).text, compare(expected, pose)

@@ -1,9 +1,9 @@
 """Compares a plan with a running tree or a recording, edge by edge.
 
 Fixed poses are compared by value: poses that tfcompose publishes, poses on /tf_static from another
-owner if the robot file states a pose, and the fixed part of a joint's pose. A driver may publish
-calibrated frames inside a sensor. These frames are compared with the precision that the preset
-claims.
+owner if the robot file states a pose. The pose of a moving joint is compared with the nearest one
+that the joint allows. A driver may publish calibrated frames inside a sensor. These frames are
+compared with the precision that the preset claims.
 
 ``verify`` returns a verdict for each edge. The doctor reports differences of the same kind and
 publisher together.
@@ -61,7 +61,6 @@ FEWEST = 4
 NAMELESS_S = 0.7
 #: Maximum number of wrong poses that a finding lists.
 MOST_POSES = 6
-_TURNING = frozenset({"revolute", "continuous"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,14 +233,10 @@ class _Comparison:
             yield Difference("TF846", edge, observed, off=off)
 
     def _off(self, edge: PlanEdge, pose: Pose) -> Offset | None:
-        """Return the deviation from the fixed part of the pose, None if no part is fixed."""
-        off = offset_of(edge.pose, pose)
-        if edge.joint is not None:
-            if edge.joint.type in _TURNING:
-                return Offset(off.xyz_m, 0.0)
-            return Offset(0.0, off.rot_rad) if edge.joint.type == "prismatic" else None
-        owner = self.plan.process(edge.owner)
-        return off if is_fixed(edge, owner) else None
+        """Return the deviation from the planned pose; None if only the owner knows the pose."""
+        if edge.joint is None and not is_fixed(edge, self.plan.process(edge.owner)):
+            return None
+        return offset_of(edge.nearest_pose(pose), pose)
 
 
 def _times(edge: PlanEdge, observed: EdgeState, *, simulated: bool) -> Iterator[Difference]:

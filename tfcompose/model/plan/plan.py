@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from msgspec import Meta
 
-from tfcompose.foundation.geometry import Offset, Pose, offset_of
+from tfcompose.foundation.geometry import Offset, Pose, norm, normalise, offset_of
 from tfcompose.model.fields import documented_field
 
 #: What moves an edge: nothing, joint states, or its owner.
@@ -125,6 +125,24 @@ class PlanJoint:
     #: In rad, or in m for a prismatic joint.
     offset: float = 0.0
 
+    def nearest(self, motion: Pose) -> Pose:
+        """Return the motion nearest to ``motion`` that the joint allows.
+
+        Both are poses of the child, in m, in the child at q = 0. Of a rotation, a turning joint
+        keeps the part about its axis (swing-twist decomposition). Planar and floating joints are
+        not limited here.
+        """
+        (x, y, z), (qx, qy, qz, qw) = self.axis, motion.quat_xyzw
+        if self.type == "prismatic":
+            along = sum(a * b for a, b in zip(self.axis, motion.xyz, strict=True))
+            return Pose((x * along, y * along, z * along))
+        if self.type not in {"revolute", "continuous"}:
+            return motion
+        twist = x * qx + y * qy + z * qz
+        if not norm((twist, qw)):  # half a turn about another axis: no position is nearer
+            return Pose()
+        return Pose(quat_xyzw=normalise((x * twist, y * twist, z * twist, qw)))
+
 
 @dataclass(frozen=True, slots=True)
 class PlanEdge:
@@ -161,6 +179,16 @@ class PlanEdge:
     def adjustment(self) -> Offset | None:
         """How far an adjusted pose is from the built one; None if nothing adjusted it."""
         return offset_of(self.earlier[0], self.pose) if self.earlier else None
+
+    def nearest_pose(self, pose: Pose) -> Pose:
+        """Return the pose, at some position of the edge's joint, that is nearest to ``pose``.
+
+        Raises:
+            ZeroDivisionError: if all four components of the quaternion of ``pose`` are 0.
+        """
+        if self.joint is None:
+            return self.pose
+        return self.pose @ self.joint.nearest(self.pose.inverse() @ pose)
 
     @property
     def silent_after_s(self) -> float | None:

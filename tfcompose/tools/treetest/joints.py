@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Note, finding
-from tfcompose.foundation.geometry import (
-    Offset,
-    Pose,
-    angle_between,
-    norm,
-    normalise,
-    offset_of,
-    rotate,
-)
+from tfcompose.foundation.geometry import Offset, Pose, norm, offset_of
 from tfcompose.foundation.numbers import numbers
 
 if TYPE_CHECKING:
@@ -22,14 +14,10 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.geometry import Vector
-    from tfcompose.model.plan import JointType, PlanEdge
+    from tfcompose.model.plan import PlanEdge, PlanJoint
     from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.replay import Arrival
     from tfcompose.tools.treetest.spec import JointExpectation
-
-#: Joints with one axis. Of planar and floating ones the motion is not compared.
-_TURNING = frozenset({"revolute", "continuous"})
-_SLIDING = "prismatic"
 
 
 @dataclass(slots=True)
@@ -38,11 +26,9 @@ class JointProbe:
 
     parent: str
     child: str
-    type: JointType
+    joint: PlanJoint
     #: The pose of the child at joint position 0.
     origin: Pose
-    #: A unit vector in the child frame.
-    axis: Vector
     within: Offset
     #: The first pose off the joint's motion; None: every pose is on it.
     pose: Pose | None = None
@@ -58,44 +44,26 @@ class JointProbe:
             pose = Pose(row[4:7], row[7:11])
             if not norm(pose.quat_xyzw):
                 continue
-            offset = self._offset(Pose(pose.xyz, normalise(pose.quat_xyzw)))
+            motion = self.origin.inverse() @ pose
+            offset = offset_of(self.joint.nearest(motion), motion)
             if offset.beyond(self.within):
                 self.pose, self.offset, self.elapsed_s = pose, offset, arrival.elapsed_s
-
-    def _offset(self, pose: Pose) -> Offset:
-        """Return how far a pose is from the nearest one that the joint can reach."""
-        motion = self.origin.inverse() @ pose
-        if self.type == _SLIDING:
-            along = sum(a * b for a, b in zip(motion.xyz, self.axis, strict=True))
-            aside = tuple(a - along * b for a, b in zip(motion.xyz, self.axis, strict=True))
-            return Offset(norm(aside), angle_between((0.0, 0.0, 0.0, 1.0), motion.quat_xyzw))
-        # The rotation moves the axis itself by the least angle that no turn about it explains.
-        moved = rotate(motion.quat_xyzw, self.axis)
-        tilt = norm(tuple(a - b for a, b in zip(moved, self.axis, strict=True)))
-        return Offset(norm(motion.xyz), tilt)
 
 
 def expected_motion(expected: JointExpectation, planned: PlanEdge) -> JointProbe | None:
     """Return the probe for a joint's motion; what is not expected is as the robot file says.
 
-    None if the edge has no joint with one axis.
+    None if the edge has no joint.
     """
     if planned.joint is None:
         return None
-    kind = expected.type or planned.joint.type
-    if kind not in {*_TURNING, _SLIDING}:
-        return None
-    origin = Pose(expected.xyz or planned.pose.xyz, expected.rotation or planned.pose.quat_xyzw)
-    axis = _unit(expected.axis or planned.joint.axis)
-    within = Offset(*expected.within)
-    return JointProbe(
-        parent=planned.parent,
-        child=planned.child,
-        type=kind,
-        origin=origin,
-        axis=axis,
-        within=within,
+    joint = replace(
+        planned.joint,
+        type=expected.type or planned.joint.type,
+        axis=_unit(expected.axis or planned.joint.axis),
     )
+    origin = Pose(expected.xyz or planned.pose.xyz, expected.rotation or planned.pose.quat_xyzw)
+    return JointProbe(planned.parent, planned.child, joint, origin, Offset(*expected.within))
 
 
 def judge_declared_joint(
@@ -140,8 +108,9 @@ def judge_motion(case: Case, pair: str, probe: JointProbe) -> Iterator[Finding]:
         return
     xyz, quat = numbers(probe.pose.xyz), numbers(probe.pose.quat_xyzw)
     message = (
-        f"{pair}: expected the motion of a {probe.type} joint about {numbers(probe.axis)} within"
-        f" {probe.within.text}; off by {probe.offset.text} at {probe.elapsed_s:.3f} s"
+        f"{pair}: expected the motion of a {probe.joint.type} joint about"
+        f" {numbers(probe.joint.axis)} within {probe.within.text};"
+        f" off by {probe.offset.text} at {probe.elapsed_s:.3f} s"
     )
     span = case.span("expect", "edges", pair, "joint")
     yield finding("TF931", message, span, notes=[Note(f"it was xyz {xyz}, quat_xyzw {quat}")])

@@ -3,20 +3,25 @@
 MuJoCo's own accelerometer, gyroscope and ray casts measure; nothing here knows how tfcompose
 computes. Noise is that of data sheets: a MEMS IMU (150 µg/√Hz, 20 mg, 0.015 deg/s/√Hz), a lidar
 (15 mm), a stereo camera (error grows with the square of the distance), and wheels that slip.
+
+``python -m tests.support.simulated_rover`` writes the small recording that is kept, ``RECORDING``.
 """
 
 from __future__ import annotations
 
 import math
+import tempfile
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.rosbag2 import CompressionMode
 from scipy.spatial.transform import Rotation
 
-from tests.support.bags import header, message
+from tests.support.bags import header, message, write_bag
 
 Array = NDArray[np.float64]
 STEP_S = 0.002
@@ -50,6 +55,30 @@ MOUNTS = {
     "rear": Mount((-0.25, -0.2, 0.3), (0.0, 0.0, 180.0)),
     "camera": Mount((0.35, 0.0, 0.25), (0.0, 20.0, 0.0)),
 }
+#: The frames in the headers of messages.
+FRAMES = {name: f"{name}_link" for name in MOUNTS} | {"camera": "camera_optical_frame"}
+#: Ten seconds of all sensors, with the mounts and frames above.
+RECORDING = Path(__file__).parents[1] / "tools" / "prove" / "rover.mcap"
+
+
+def robot_file(mounts: dict[str, Mount] = MOUNTS, parent: str = "base_link") -> str:
+    """Return the rover's robot file; ``parent`` is that of the camera."""
+    return f"""\
+tfcompose: 1
+robot: rover
+frames:
+  odom: {{}}
+  base_footprint: {{parent: odom, owner: drive, rate: 20 Hz}}
+  base_link: {{parent: base_footprint, xyz: [0, 0, {HEIGHT}]}}
+  camera_link: {{parent: {parent}, {mounts["camera"].yaml}}}
+  camera_optical_frame: {{parent: camera_link, rpy: [-90 deg, 0, -90 deg]}}
+sensors:
+  imu: {{preset: generic/imu, parent: base_link, {mounts["imu"].yaml}}}
+  front: {{preset: generic/lidar3d, parent: base_link, {mounts["front"].yaml}}}
+  rear: {{preset: generic/lidar3d, parent: base_link, {mounts["rear"].yaml}}}
+processes:
+  drive: {{external: true, node: diff_drive}}
+"""
 
 
 class Route:
@@ -287,3 +316,34 @@ def messages_of(measured: Measured, frames: dict[str, str]) -> list[tuple[str, f
                 )
             )
     return sorted(sent, key=lambda each: each[1])
+
+
+def thinned(measured: Measured) -> Measured:
+    """Return half of the IMU's samples and a sixth of the points, rounded, to keep them small."""
+    return Measured(
+        [
+            (at_s, np.round(force, 4), np.round(rates, 5))
+            for at_s, force, rates in measured.imu[::2]
+        ],
+        measured.odometry,
+        {
+            name: [(at_s, np.round(points[::6], 3)) for at_s, points in clouds]
+            for name, clouds in measured.clouds.items()
+        },
+    )
+
+
+def main() -> None:
+    """Write the small recording."""
+    measured = thinned(simulate(seed=11, seconds=10, cloud_rate=2))
+    with tempfile.TemporaryDirectory() as folder:
+        bag = write_bag(
+            Path(folder, RECORDING.stem),
+            compressed=CompressionMode.STORAGE,
+            messages=messages_of(measured, FRAMES),
+        )
+        RECORDING.write_bytes((bag / RECORDING.name).read_bytes())
+
+
+if __name__ == "__main__":
+    main()

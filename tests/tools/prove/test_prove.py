@@ -11,8 +11,12 @@ import pytest
 from tests.support.bags import camera_info, header, message, tfcompose_without_ros, write_bag
 from tests.support.cli import tfcompose_in
 from tests.support.simulated_rover import (
+    MOUNTS,
+    RECORDING,
     Measured,
+    Mount,
     messages_of,
+    robot_file,
     simulate,
 )
 
@@ -60,9 +64,12 @@ def record(tmp_path: Path, driven: Measured) -> Callable[..., Path]:
     return write
 
 
-def prove(folder: Path, *words: str, code: int = 0) -> tuple[dict[tuple[str, str], Any], str]:
+def prove(
+    folder: Path, *words: str, bag: str | Path = "bag", code: int = 0
+) -> tuple[dict[tuple[str, str], Any], str]:
     """Return the checks by sensor and name, and what went to stderr."""
-    done = tfcompose_in(folder, "prove", "robot.yaml", "--bag", "bag", "--format", "json", *words)
+    command = ("prove", "robot.yaml", "--bag", str(bag), "--format", "json", *words)
+    done = tfcompose_in(folder, *command)
     assert done.returncode == code, done.stdout + done.stderr
     checks = json.loads(done.stdout)["checks"]
     return {(each["sensor"], each["check"]): each for each in checks}, done.stderr
@@ -315,3 +322,26 @@ def prove_text(folder: Path, *words: str, code: int) -> str:
     done = tfcompose_in(folder, "prove", "robot.yaml", "--bag", "bag", *words)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stderr
+
+
+@pytest.mark.parametrize(
+    ("sensor", "rpy_deg", "check"),
+    [
+        ("imu", MOUNTS["imu"].rpy_deg, None),
+        ("imu", (180.0, 0.0, 0.0), "gravity"),
+        ("front", (0.0, 0.0, 90.0), "forward"),
+        ("rear", (0.0, 5.0, 180.0), "floor"),
+        ("camera", (0.0, 25.0, 0.0), "floor"),
+    ],
+)
+def test_the_kept_recording_of_all_sensors_differs_from_a_wrong_mount_only(
+    sensor: str, rpy_deg: tuple[float, float, float], check: str | None, tmp_path: Path
+) -> None:
+    mount = Mount(MOUNTS[sensor].xyz, rpy_deg)
+    (tmp_path / "robot.yaml").write_text(robot_file(MOUNTS | {sensor: mount}), "utf-8")
+    checks, _ = prove(tmp_path, bag=RECORDING, code=0 if check is None else 1)
+    answers = [each["answer"] for each in checks.values()]
+    assert answers.count("agrees") >= 15, "nearly all checks can tell"
+    differing = {key for key, each in checks.items() if each["answer"] == "differs"}
+    frame = "camera_optical_frame" if sensor == "camera" else sensor
+    assert differing == ({(frame, check)} if check else set())

@@ -16,11 +16,13 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.bags import STORE
 from tests.support.simulated_rover import (
+    FRAMES,
     HEIGHT,
     MOUNTS,
     Measured,
     Mount,
     messages_of,
+    robot_file,
     simulate,
 )
 from tfcompose.cli.compiling import library
@@ -32,29 +34,8 @@ from tfcompose.tools.prove.verdict import SensorVerdict
 CLEAN_RUNS = int(os.environ.get("TFCOMPOSE_TEST_CLEAN_RUNS", "3"))
 pytestmark = pytest.mark.slow
 
-FRAMES = {name: f"{name}_link" for name in MOUNTS} | {"camera": "camera_optical_frame"}
 #: A fault is found within these.
 WITHIN_RAD, WITHIN_M = math.radians(0.5), 0.02
-
-
-def robot(mounts: dict[str, Mount] = MOUNTS, parent: str = "base_link") -> str:
-    """Return the robot file; ``parent`` is that of the camera."""
-    return f"""\
-tfcompose: 1
-robot: rover
-frames:
-  odom: {{}}
-  base_footprint: {{parent: odom, owner: drive, rate: 20 Hz}}
-  base_link: {{parent: base_footprint, xyz: [0, 0, {HEIGHT}]}}
-  camera_link: {{parent: {parent}, {mounts["camera"].yaml}}}
-  camera_optical_frame: {{parent: camera_link, rpy: [-90 deg, 0, -90 deg]}}
-sensors:
-  imu: {{preset: generic/imu, parent: base_link, {mounts["imu"].yaml}}}
-  front: {{preset: generic/lidar3d, parent: base_link, {mounts["front"].yaml}}}
-  rear: {{preset: generic/lidar3d, parent: base_link, {mounts["rear"].yaml}}}
-processes:
-  drive: {{external: true, node: diff_drive}}
-"""
 
 
 def prove(
@@ -104,7 +85,7 @@ def inverse(mount: Mount) -> Mount:
 def declare(name: str, rpy_deg: tuple[float, float, float], z: float = 0.0) -> str:
     """Return a robot file with another mount of a sensor."""
     x, y, height = MOUNTS[name].xyz
-    return robot(MOUNTS | {name: Mount((x, y, height + z), rpy_deg)})
+    return robot_file(MOUNTS | {name: Mount((x, y, height + z), rpy_deg)})
 
 
 @dataclass(frozen=True)
@@ -113,7 +94,7 @@ class Fault:
 
     #: The sensors, checks and codes of the findings.
     findings: set[tuple[str, str, str]]
-    text: str = robot()
+    text: str = robot_file()
     data: Callable[[Measured], Measured] = lambda measured: measured
     frames: tuple[tuple[str, str], ...] = ()
 
@@ -135,12 +116,12 @@ FAULTS = {
     "left and right": Fault({("front", "left and right", "TF651")}, data=mirrored),
     "a mount on the other side": Fault(
         {("rear", "overlap", "TF654")},
-        robot(MOUNTS | {"rear": replace(MOUNTS["rear"], xyz=(-0.25, 0.2, 0.3))}),
+        robot_file(MOUNTS | {"rear": replace(MOUNTS["rear"], xyz=(-0.25, 0.2, 0.3))}),
     ),
     "degrees for radians": Fault({("imu", "yaw rate", "TF651")}, data=with_imu(np.degrees)),
     "inverse calibration": Fault(
         {("camera_optical_frame", "floor", "TF650"), ("camera_optical_frame", "height", "TF653")},
-        robot(MOUNTS | {"camera": inverse(MOUNTS["camera"])}),
+        robot_file(MOUNTS | {"camera": inverse(MOUNTS["camera"])}),
     ),
     "serial numbers": Fault(
         {
@@ -154,7 +135,7 @@ FAULTS = {
         {("camera_link", "floor", "TF650")}, frames=(("camera", "camera_link"),)
     ),
     "wrong parent": Fault(
-        {("camera_optical_frame", "height", "TF653")}, robot(parent="front_link")
+        {("camera_optical_frame", "height", "TF653")}, robot_file(parent="front_link")
     ),
 }
 
@@ -189,7 +170,7 @@ def test_a_seeded_fault_differs_at_its_sensor_only(name: str, driven: Measured) 
 
 @pytest.mark.parametrize("seed", range(100, 100 + CLEAN_RUNS))
 def test_a_clean_run_has_no_finding(seed: int) -> None:
-    verdicts, _ = prove(simulate(seed=seed), robot())
+    verdicts, _ = prove(simulate(seed=seed), robot_file())
     assert differing(verdicts) == set()
     answers = [each.judgement.answer for each in verdicts]
     assert answers.count("agrees") >= 14, "nearly all checks can tell"
@@ -197,11 +178,11 @@ def test_a_clean_run_has_no_finding(seed: int) -> None:
 
 @pytest.mark.alone
 def test_half_a_minute_is_judged_within_ten_seconds_of_a_core(driven: Measured) -> None:
-    assert prove(driven, robot())[1] < 10
+    assert prove(driven, robot_file())[1] < 10
 
 
 def test_at_rest_checks_that_need_motion_cannot_tell() -> None:
-    verdicts, _ = prove(simulate(seed=12, moves=False, seconds=6), robot())
+    verdicts, _ = prove(simulate(seed=12, moves=False, seconds=6), robot_file())
     moving = {"yaw rate", "heading", "forward", "left and right"}
     answers = {
         (each.sensor, each.judgement.check): each.judgement.answer

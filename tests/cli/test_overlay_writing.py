@@ -149,7 +149,7 @@ KILLER = """\
 import os, signal, sys
 from dataclasses import replace
 from pathlib import Path
-from tests.cli.test_robot_overlay import OVERLAY, opened
+from tests.cli.test_overlay_writing import OVERLAY, opened
 
 OLD, NEW = "# old\\ntfcompose: 1\\n", "# new\\ntfcompose: 1\\n"
 opened().write(OLD)

@@ -153,13 +153,13 @@ def test_no_name_of_a_test_is_longer_than_a_claim() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_840,
+    "foundation": 1_900,
     "model": 2_050,
     "spec": 5_345,
     "compiler": 10_925,
     "tf": 5_950,
     "guard": 4_553,
-    "launcher": 4_280,
+    "launcher": 4_225,
     "cli": 6_200,
     "tools": 19_700,
 }

@@ -12,8 +12,8 @@ from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.cli import main
 from tfcompose.cli.parser import COMMANDS
+from tfcompose.foundation.signal_queue import SignalQueue
 from tfcompose.foundation.signals import RememberedInterrupt, Stop, take_interrupt
-from tfcompose.launcher.supervisor import Signals
 
 
 class Loaded:
@@ -45,7 +45,7 @@ def test_the_launcher_takes_an_interrupt_that_python_threw_away(lost: list[objec
     with RememberedInterrupt():
         lose_an_interrupt()
         assert not lost, "it would be printed"
-        with Signals() as signals:
+        with SignalQueue() as signals:
             assert os.read(signals.fd, 10)
             assert list(signals.take()) == [signal.SIGINT]
     assert not take_interrupt()

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.support.waiting import TIMEOUT_S
+from tfcompose.foundation.signal_queue import SignalQueue
 from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, ChildCommand, Lines, Pipe, spawn
 from tfcompose.launcher.children import Reaper
 from tfcompose.launcher.program import HERE
-from tfcompose.launcher.supervisor import Signals
 from tfcompose.model.plan import PlanProcess
 
 ON_A_TERMINAL = PlanProcess("p", "run", emulate_tty=True)
@@ -98,7 +98,7 @@ def test_a_line_comes_without_its_end_and_never_fails_to_be_text(data: bytes, li
 def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with Signals():
+        with SignalQueue():
             assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
             assert signal.getsignal(signal.SIGTERM) != signal.SIG_DFL
         assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN

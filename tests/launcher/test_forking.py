@@ -28,13 +28,13 @@ import os, signal, socket, sys, time
 from pathlib import Path
 from tfcompose.launcher import forking
 from tfcompose.launcher.child import ChildCommand, spawn
-from tfcompose.launcher.supervisor import Signals
+from tfcompose.foundation.signal_queue import SignalQueue
 forking.HERE = (sys.executable, str(Path("program.py").absolute()))
 def run():
     exec(sys.argv[1], {})
     return 0
 forker = forking.Forker(lambda: None, run)
-signals = Signals().__enter__()
+signals = SignalQueue().__enter__()
 file, listener = open("held", "w"), socket.socket()
 os.set_inheritable(file.fileno(), True)
 theirs, ours = os.pipe()

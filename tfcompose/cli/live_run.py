@@ -19,10 +19,11 @@ import msgspec
 from tfcompose.cli.console import Console
 from tfcompose.cli.runs import plan_of_run
 from tfcompose.cli.terminal import FAILED, can_redraw, code_addresses, is_coloured, warn
+from tfcompose.foundation.signal_queue import SignalQueue
+from tfcompose.foundation.signals import SIGNALS
 from tfcompose.foundation.text import plural
 from tfcompose.launcher.control import connect
 from tfcompose.launcher.output import Follower, NonBlockingOutput, runs_of
-from tfcompose.launcher.supervisor import ENDING, Signals
 from tfcompose.launcher.usage import UsageMeter
 from tfcompose.model.messages import (
     Ended,
@@ -87,10 +88,10 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
     and ``warnings`` were already printed. The view shows them again, because it covers the earlier
     output.
     """
-    with Signals(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
+    with SignalQueue(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         from tfcompose.cli.dashboard import (
-            Dashboard,  # importing rich is slow; meanwhile, Signals records signals
+            Dashboard,  # importing rich is slow; meanwhile, the queue records signals
         )
         from tfcompose.cli.screen import Screen
 
@@ -146,7 +147,7 @@ class _LauncherConnection:
 
 class _LiveView:
     def __init__(
-        self, runtime_dir: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals
+        self, runtime_dir: RuntimeDir, dashboard: Dashboard, launcher: int, signals: SignalQueue
     ) -> None:
         from tfcompose.cli.keys import KeyDecoder
 
@@ -307,7 +308,7 @@ class _LiveView:
     def _take_signal(self, number: int) -> None:
         if number == signal.SIGTSTP:
             self._screen.suspend()
-        elif number in ENDING or number == signal.SIGQUIT:
+        elif number in SIGNALS or number == signal.SIGQUIT:
             self._pass_on(signal.SIGTERM if number == signal.SIGQUIT else signal.Signals(number))
         self._stale = True
 

@@ -50,6 +50,7 @@ from tfcompose.cli.terminal import (
     warn,
 )
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.signals import SIGNALS
 from tfcompose.launcher.child import end_with
 from tfcompose.launcher.forking import Forker
 from tfcompose.launcher.output import Logs, NonBlockingOutput
@@ -63,7 +64,7 @@ from tfcompose.launcher.runtime_dir import (
     runtime_dir_of,
     user_name,
 )
-from tfcompose.launcher.supervisor import ENDING, RunSession, supervise
+from tfcompose.launcher.supervisor import RunSession, supervise
 from tfcompose.model.messages import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
 from tfcompose.tf.ros.environment import (
     child_environment,
@@ -148,7 +149,7 @@ def start(
         if arguments.detach or arguments.wait:
             return _detach(plan, runtime_dir, lock, session, arguments)
         if arguments.live and can_show_live():
-            mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+            mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
             pid = _fork(plan, runtime_dir, lock, session, arguments.duration, mask)
             stack.close()  # from now on, the launcher holds the lock
             return follow(runtime_dir, plan, pid, mask, built_with, warnings)

@@ -252,8 +252,8 @@ def spawn(command: ChildCommand, pass_fds: tuple[int, ...]) -> subprocess.Popen[
     """Start the command as the leader of a new session, with pipes for its output.
 
     A process of tfcompose starts with the ending signals blocked, and unblocks them when it
-    handles them (``tfcompose.signals``). A signal that arrives while Python starts therefore stays
-    pending. It neither kills the process nor causes a traceback.
+    handles them (``foundation.signals``). A signal that arrives while Python starts therefore
+    stays pending. It neither kills the process nor causes a traceback.
 
     Raises:
         OSError: if the command cannot be started.

@@ -11,19 +11,18 @@ import contextlib
 import math
 import os
 import selectors
-import signal
 import time
 from collections import deque
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.findings import Note
-from tfcompose.foundation.signals import take_interrupt
+from tfcompose.foundation.signal_queue import SignalQueue
 from tfcompose.launcher.answers import CommandInputs
 from tfcompose.launcher.answers import answer as answer_to
 from tfcompose.launcher.child import subreaper
@@ -61,8 +60,7 @@ from tfcompose.model.plan.components import load_file
 from tfcompose.tf.ros.environment import child_environment
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-    from types import FrameType
+    from collections.abc import Callable, Mapping
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.answers import Answer
@@ -80,8 +78,6 @@ if TYPE_CHECKING:
 LONGEST_SLEEP_S = 1.0
 #: Interval between checks of the run's files, in seconds.
 FILES_CHECK_S = 0.5
-#: Signals that end a plan.
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 #: Kinds of processes that can join ROS early and wait before they publish.
 _PREPARED = ("static", "joints", "simulate")
@@ -178,7 +174,7 @@ class _Supervisor:
         self._loads: dict[str, tuple[Path, str]] = {}
         selector = stack.enter_context(selectors.DefaultSelector())
         self._selector = selector
-        self._signals = stack.enter_context(Signals())
+        self._signals = stack.enter_context(SignalQueue())
         selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
         self._session = session
         self._environments = environments
@@ -386,64 +382,3 @@ class _Supervisor:
         writes = component.container if component else name
         notes = [Note(f"{writes}: {line}") for line in self._children.last_lines(writes)]
         self._notify(FindingShown(replace(finding, notes=(*finding.notes, *notes))))
-
-
-@final
-class Signals:
-    """Catches the signals that end a run, and SIGCHLD, which wakes the loop.
-
-    Afterwards it restores the handlers. If SIGHUP is ignored, as with ``nohup``, it stays ignored.
-    ``more`` are further signals to catch.
-    """
-
-    def __init__(self, *more: signal.Signals) -> None:
-        self._more = more
-        self._taken: deque[int] = deque()
-        self._children_changed = False
-        self._stack = contextlib.ExitStack()
-        self.fd = -1
-
-    def __enter__(self) -> Signals:
-        self.fd, write_fd = os.pipe()
-        self._stack.callback(os.close, self.fd)
-        self._stack.callback(os.close, write_fd)
-        os.set_blocking(self.fd, False)
-        os.set_blocking(write_fd, False)
-        before = signal.set_wakeup_fd(write_fd, warn_on_full_buffer=False)
-        self._stack.callback(signal.set_wakeup_fd, before)
-        for number in (*ENDING, signal.SIGCHLD, *self._more):
-            if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
-                continue
-            handler = signal.signal(number, self._append)
-            self._stack.callback(
-                signal.signal, number, signal.SIG_DFL if handler is None else handler
-            )
-        if take_interrupt():
-            self._taken.append(signal.SIGINT)
-            os.write(write_fd, b"\0")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
-
-    def _append(self, number: int, _frame: FrameType | None) -> None:
-        self._taken.append(number)
-
-    def woken(self) -> None:
-        """Empty the pipe that has woken the loop."""
-        with contextlib.suppress(BlockingIOError):
-            os.read(self.fd, 4096)
-
-    def take(self) -> Iterator[int]:
-        """Yield the signals received since the previous call, without SIGCHLD."""
-        while self._taken:
-            number = self._taken.popleft()
-            if number != signal.SIGCHLD:
-                yield number
-            else:
-                self._children_changed = True
-
-    def take_children_changed(self) -> bool:
-        """Return whether SIGCHLD was among the signals that the previous ``take`` consumed."""
-        changed, self._children_changed = self._children_changed, False
-        return changed

@@ -20,9 +20,9 @@ from tfcompose.cli.live_run import ESCAPE_S
 from tfcompose.cli.runs import plan_file
 from tfcompose.cli.screen import Screen
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.signal_queue import SignalQueue
 from tfcompose.launcher.control import RequestRefusedError, connect
 from tfcompose.launcher.output import NonBlockingOutput
-from tfcompose.launcher.supervisor import Signals
 from tfcompose.tools.adjust.controls import Controls, apply_steps
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def nudge_by_keys(
     """
     more = signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT
     with contextlib.ExitStack() as stack:
-        signals = stack.enter_context(Signals(*more))
+        signals = stack.enter_context(SignalQueue(*more))
         connection = stack.enter_context(connect(runtime_dir))
         output = stack.enter_context(contextlib.closing(NonBlockingOutput(sys.stdout.fileno())))
         screen = stack.enter_context(Screen(sys.stdin.fileno(), output))
@@ -100,7 +100,7 @@ class _Session:
         # A request that is under way may still write to the other end.
         os.close(self._reader)
 
-    def run(self, screen: Screen, signals: Signals, connection: socket) -> None:
+    def run(self, screen: Screen, signals: SignalQueue, connection: socket) -> None:
         with selectors.DefaultSelector() as selector:
             selector.register(signals.fd, selectors.EVENT_READ, signals.woken)
             selector.register(screen.fd, selectors.EVENT_READ, lambda: self._read_keys(screen))

@@ -32,7 +32,8 @@ def write_bag(
 ) -> Path:
     """Write a bag with one message for each transform; times count from START_S.
 
-    ``messages`` are further ones, of any type: topic, seconds of the recording, type and message.
+    ``messages`` are further ones, of any type: topic, seconds of the recording, type, and message
+    or bytes.
     """
     kind = "tf2_msgs/msg/TFMessage"
     bag = Writer(
@@ -45,10 +46,11 @@ def write_bag(
         for topic, at_s, other_kind, message in messages:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, other_kind, typestore=STORE)
+            is_raw = isinstance(message, bytes)
             writer.write(
                 connections[topic],
                 round((START_S + at_s) * 1e9),
-                STORE.serialize_cdr(message, other_kind),
+                message if is_raw else STORE.serialize_cdr(message, other_kind),
             )
         for topic, at_s, parent, child, stamp_s, xyz, quat_xyzw in sent:
             if topic not in connections:

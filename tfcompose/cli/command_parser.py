@@ -94,7 +94,7 @@ class Parser(ArgumentParser):
     def _settings(self, argv: Sequence[str]) -> tuple[list[str], list[str]]:
         """Return two lists: arguments NAME:=VALUE, and all other arguments.
 
-        An argument NAME:=VALUE that belongs to an option is in the second list.
+        An argument NAME:=VALUE that belongs to an option or follows ``--`` is in the second list.
         """
         renaming = {
             option
@@ -105,7 +105,10 @@ class Parser(ArgumentParser):
         settings: list[str] = []
         rest: list[str] = []
         before = ""
-        for argument in argv:
+        for number, argument in enumerate(argv):
+            if argument == "--":
+                rest += argv[number:]
+                break
             is_setting = _GIVEN.match(argument) and before not in renaming
             (settings if is_setting else rest).append(argument)
             before = argument

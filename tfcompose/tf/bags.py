@@ -39,6 +39,8 @@ CLOCK = "rosgraph_msgs/msg/Clock"
 _CLOCK, _CLOCK_BYTES = Struct("<iI"), 12
 _SECOND_NS = 1_000_000_000
 ENDINGS = {".mcap", ".db3"}
+#: The languages of MCAP's message definitions that are not ROS 2's (MCAP's registry).
+_FOREIGN = frozenset({"flatbuffer", "jsonschema", "omgidl", "protobuf", "ros1msg"})
 #: Maximum number of topics that an error lists if the requested topics are missing.
 _NAMED_AT_MOST = 12
 
@@ -436,6 +438,9 @@ def damage_error(path: str, error: Exception) -> BagError:
     if "end magic" in reason:
         reason = "it ends in the middle, as when the recorder was killed"
         advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"
+    elif isinstance(error, KeyError) and error.args[0] in _FOREIGN:
+        reason = f"it has messages in {error.args[0]}; only those of ROS 2 can be read"
+        advice = "mcap filter FILE --exclude-topic-regex TOPIC -o OTHERS.mcap leaves them out"
     elif (
         _is_mcap(Path(path))
         and not isinstance(error, OSError)

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from rosbags.rosbag2 import CompressionMode
 
 from tests.support import processes
 from tests.support.bags import write_bag
@@ -38,7 +39,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "ros2").write_text(PLAYER, "utf-8")
     (tmp_path / "bin" / "ros2").chmod(0o755)
-    write_bag(tmp_path / "drive", RECORDED)
+    write_bag(tmp_path / "drive", RECORDED, compressed=CompressionMode.MESSAGE)
     return tmp_path
 
 
@@ -83,3 +84,20 @@ def test_print_starts_nothing_and_names_fixed_edges_on_tf(folder: Path) -> None:
     assert "warning[TF927]" in done.stderr
     assert "base_link → bracket" in done.stderr
     assert not (folder / "player.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "rules", "remaining"),
+    [
+        (["--rate", "2", "--remap", "/a:=/b", "/c:=/d"], ["/a:=/b", "/c:=/d"], ["--rate", "2"]),
+        (["-m", "/a:=/b", "--loop"], ["/a:=/b"], ["--loop"]),
+        (["--remap=/a:=/b", "--topics", "/tf"], ["/a:=/b"], ["--topics", "/tf"]),
+    ],
+)
+def test_remappings_of_the_user_join_those_of_fixed_edges(
+    options: list[str], rules: list[str], remaining: list[str], folder: Path
+) -> None:
+    """Of several --remap, ros2 bag play would take the last."""
+    words = ("play", "drive", "--with", "cart.yaml", "--print", "--", *options)
+    done = tfcompose_in(folder, *words)
+    assert done.stdout.split() == ["ros2", "bag", "play", "drive", *REMAPPED, *rules, *remaining]

@@ -6,6 +6,7 @@ import signal
 import sqlite3
 import sys
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -276,6 +277,8 @@ LAYOUTS: dict[str, tuple[dict[str, Any], bool]] = {
     "without a summary": ({**NO_SUMMARY, "compression": CompressionType.NONE}, True),
     "without chunks": ({"use_chunking": False}, False),
     "without chunks and a summary": ({**NO_SUMMARY, "use_chunking": False}, False),
+    "without schemas in its summary": ({"repeat_schemas": False}, True),
+    "without channels in its summary": ({"repeat_channels": False}, True),
 }
 
 
@@ -285,7 +288,7 @@ def test_an_mcap_file_keeps_all_but_the_transforms_in_its_layout(
 ) -> None:
     options, has_chunks = LAYOUTS[layout]
     write_mcap(folder / "drive.mcap", **options)
-    rebag(folder, "drive.mcap", "right.mcap")
+    assert "base_link → laser: off by 40 mm" in rebag(folder, "drive.mcap", "right.mcap")
     before, after = (records_of(folder / name) for name in ("drive.mcap", "right.mcap"))
     assert after[Message][0][0] == "/tf_static"
     for kind in (Message, Attachment):
@@ -355,16 +358,17 @@ def split_bag(folder: Path) -> None:
     (folder / "metadata.yaml").write_text(text, "utf-8")
 
 
-def test_the_pose_that_a_device_calibrated_itself_stays(folder: Path) -> None:
+@pytest.mark.parametrize("topic", ["/tf_static", "/tf"])
+def test_the_pose_that_a_device_calibrated_itself_stays(folder: Path, topic: str) -> None:
     (folder / "cart.yaml").write_text(
         "tfcompose: 1\nrobot: cart\nlinks: {base_link: {}}\nsensors:\n"
         "  camera: {preset: realsense/d435i, parent: base_link, tf: driver}\n",
         "utf-8",
     )
     measured = (0.0, 0.0151, 0.0)
-    recorded = [("/tf_static", 0.1, "camera_link", "camera_color_frame", 0.0, measured, UP)]
+    recorded = [(topic, 0.1, "camera_link", "camera_color_frame", 0.0, measured, UP)]
     write_bag(folder / "drive", recorded)
-    rebag(folder, "drive", "right")
+    assert "camera_link → camera_color_frame" not in rebag(folder, "drive", "right")
     buffer = buffer_of(folder / "right")
     colour = buffer.lookup_transform("camera_link", "camera_color_frame", 0).transform.translation
     assert (colour.x, colour.y, colour.z) == measured
@@ -392,7 +396,7 @@ def test_frames_are_renamed_in_tf_in_headers_and_at_any_depth(folder: Path) -> N
     sent = [("/tf_static", 0.1, "base_link", "old_laser", 0.0, (0.2, 0.0, 0.3), UP)]
     messages = [*OTHERS, ("/path", 0.4, "nav_msgs/msg/Path", path)]
     write_bag(folder / "drive", sent, messages=messages)
-    renames = ("--rename", "old_laser:=laser", "--rename", "old_lens:=lens")
+    renames = ("--rename", "/old_laser:=laser", "--rename", "old_lens:=/lens")
     assert "base_link → laser: off by 40 mm" in rebag(folder, "drive", "right", *renames)
     data = {each.topic: each.data for each in messages_of(folder / "right")}
     read: Any = STORE.deserialize_cdr(data["/path"], "nav_msgs/msg/Path")
@@ -436,10 +440,44 @@ def test_camera_info_is_replaced_but_for_its_header_binning_and_region(folder: P
     assert (info.header.frame_id, info.binning_x) == ("old_lens", 2)
 
 
+@pytest.mark.parametrize("kind", ["mcap", "mcap of compressed messages", "sqlite"])
+def test_a_message_that_cannot_be_decoded_stays(folder: Path, kind: str) -> None:
+    topic, at_s, type_, info = camera_info(0.3, "old_lens")
+    complete = bytes(STORE.serialize_cdr(info, type_))
+    parts = complete[:60], complete, complete + bytes(9)
+    bag = write_bag(
+        folder / "drive", messages=[(topic, at_s, type_, data) for data in parts], **KINDS[kind]
+    )
+    output = rebag(folder, "drive", "right", "--rename", "old_lens:=lens")
+    assert "warning[TF925] 2 messages on /camera/camera_info" in output
+    before, after = messages_of(bag), not_tf(messages_of(folder / "right"))
+    assert [each.data for each in after][::2] == [each.data for each in before][::2]
+    assert b"old_lens" not in after[1].data
+
+
+@pytest.mark.parametrize("names", ["laser:=", "laser:=/", "/:=laser"])
+def test_an_empty_name_of_a_frame_is_refused(folder: Path, names: str) -> None:
+    write_bag(folder / "drive", RECORDED)
+    assert "--rename" in rebag(folder, "drive", "right", "--rename", names, code=2)
+    assert not (folder / "right").exists()
+
+
+def test_a_database_with_a_log_of_writes_gets_no_new_file(folder: Path) -> None:
+    write_bag(folder / "drive", RECORDED, mcap=False)
+    with closing(sqlite3.connect(folder / "drive" / "drive.db3")) as database:
+        database.execute("PRAGMA journal_mode = WAL")
+    before = {each.name for each in (folder / "drive").iterdir()}
+    rebag(folder, "drive", "right")
+    assert {each.name for each in (folder / "drive").iterdir()} == before
+
+
 @pytest.mark.parametrize(
     ("words", "code"),
     [
         (("drive", "cart.yaml"), "TF924"),
+        (("drive/drive.mcap", "right.db3"), "TF924"),
+        (("drive/drive.mcap", "right"), "TF924"),
+        (("foreign.mcap", "right.mcap"), "TF907"),
         (("drive", "no/folder"), "TF924"),
         (("nothing", "right"), "TF907"),
         (("cart.yaml", "right"), "TF907"),
@@ -448,6 +486,8 @@ def test_camera_info_is_replaced_but_for_its_header_binning_and_region(folder: P
         (("drive", "right", "--camera-info", "/text=cart.yaml"), "TF926"),
         (("drive", "right", "--camera-info", "/text=front.yaml"), "TF926"),
         (("drive", "right", "--camera-info", "/text=nothing.yaml"), "TF001"),
+        (("drive", "right", "--camera-info", "/camera/camera_info=endless.yaml"), "TF926"),
+        (("drive", "right", "--camera-info", "/camera/camera_info=negative.yaml"), "TF926"),
     ],
 )
 def test_a_bag_or_file_that_cannot_be_used_is_a_finding(
@@ -456,6 +496,16 @@ def test_a_bag_or_file_that_cannot_be_used_is_a_finding(
     (folder / "front.yaml").write_text(CALIBRATION, "utf-8")
     bag = write_bag(folder / "drive", RECORDED, messages=OTHERS)
     (folder / "damaged.mcap").write_bytes((bag / "drive.mcap").read_bytes()[:-3000])
+    for name, width in (("endless", ".inf"), ("negative", "-1")):
+        (folder / f"{name}.yaml").write_text(CALIBRATION.replace("1280", width), "utf-8")
+    with (folder / "foreign.mcap").open("wb") as stream:
+        foreign: Any = Writer(stream)
+        foreign.start()
+        channel = foreign.register_channel(
+            "/beep", "json", foreign.register_schema("beep", "jsonschema", b"{}")
+        )
+        foreign.add_message(channel, 1, b"{}", 1)
+        foreign.finish()
     (folder / "damaged.db3").write_bytes(b"SQLite format 3\0" + bytes(3000))
     before = {each.name for each in folder.iterdir()}
     done = tfcompose_in(folder, "rebag", *words, "--with", "cart.yaml")

@@ -24,7 +24,7 @@ from rosbags.rosbag2 import Reader
 from tfcompose.foundation.reading import exists, is_file, is_folder, read_bytes
 from tfcompose.tf.bags import ENDINGS, BagError, damage_error
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
-from tfcompose.tools.rebag.mcap_file import qos_in_mcap, rewrite_mcap
+from tfcompose.tools.rebag.mcap_file import lacks_channels, messages_in, qos_in_mcap, rewrite_mcap
 from tfcompose.tools.rebag.recorded_topic import QOS_BY_WORDS, TF_HASH, RecordedTopic
 from tfcompose.tools.rebag.rewriting import InterruptedRewrite
 from tfcompose.tools.rebag.sqlite_file import qos_in_sqlite, rewrite_sqlite
@@ -39,6 +39,8 @@ T = TypeVar("T")
 METADATA = "metadata.yaml"
 _INFORMATION = "rosbag2_bagfile_information"
 _ZSTD = ".zstd"
+#: The type of a topic without a schema in the summary of an MCAP file, as rosbags names it.
+_NO_SCHEMA = "__schemaless__"
 #: SQLite's messages when it cannot write the new file, with the system's error numbers.
 _ERRNO = {"database or disk is full": errno.ENOSPC, "disk I/O error": errno.EIO}
 
@@ -134,35 +136,62 @@ def note_static(bag: Bag, rewrite: Rewrite) -> None:
     if bag.compresses_messages:
         import zstandard  # noqa: PLC0415 (only such bags need it)
 
-        rewrite.expand = lambda data: zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        rewrite.expand = _expand
         rewrite.compress = zstandard.ZstdCompressor().compress
-    by_topic = {topics[1]: each for topics, each in rewrite.corrections.items()}
     rewrite.types = _types(bag)
-    for channel, data in _tf_messages(bag, rewrite, by_topic):
+    notes: dict[str, Callable[[bytes], None]] = {}
+    for (moving, fixed), correction in rewrite.corrections.items():
+        notes[fixed] = correction.note_static
+        if correction.nominal:
+            notes[moving] = correction.note_moving
+    for channel, data in _tf_messages(bag, rewrite, notes):
         with suppress(ValueError):  # the copy counts such messages
-            by_topic[channel.topic].note_static(data)
+            notes[channel.topic](data)
 
 
-def _types(bag: Bag) -> dict[str, str]:
-    """Return the type of each topic.
+def _expand(data: bytes) -> bytes:
+    """Return a message that was compressed separately.
+
+    Raises:
+        ValueError: if it is not compressed, or damaged.
+    """
+    import zstandard  # noqa: PLC0415 (only such bags need it)
+
+    try:
+        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from error
+
+
+def _types(bag: Bag) -> dict[str, set[str]]:
+    """Return the types of each topic; an empty one if the summary of an MCAP file lacks it.
 
     Raises:
         BagError: if the bag cannot be read.
     """
+    types: dict[str, set[str]] = {}
     with _reader(bag) as reader:
-        return {connection.topic: connection.msgtype for connection in reader.connections}
+        for connection in reader.connections:
+            type_ = "" if connection.msgtype == _NO_SCHEMA else connection.msgtype
+            types.setdefault(connection.topic, set()).add(type_)
+    return types
 
 
 @contextmanager
 def _reader(bag: Bag) -> Iterator[Reader]:
     """Open the bag; raise a BagError with a single sentence if it is damaged."""
+    with _damage_of(bag.path), Reader(bag.path) as reader:
+        yield reader
+
+
+@contextmanager
+def _damage_of(path: Path) -> Iterator[None]:
     try:
-        with Reader(bag.path) as reader:
-            yield reader
+        yield
     except InterruptedRewrite:
         raise
-    except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
-        raise damage_error(str(bag.path), error) from None
+    except Exception as error:  # noqa: BLE001 (a damaged bag makes libraries and databases raise anything)
+        raise damage_error(str(path), error) from None
 
 
 def check_bag(bag: Bag, rewrite: Rewrite) -> None:
@@ -181,16 +210,25 @@ def check_bag(bag: Bag, rewrite: Rewrite) -> None:
 def _tf_messages(
     bag: Bag, rewrite: Rewrite, topics: Collection[str]
 ) -> Iterator[tuple[RecordedTopic, bytes]]:
-    """Yield the TFMessages of these topics in the order of their times."""
+    """Yield the TFMessages of these topics in the order of their times, or of their file."""
+    files = [bag.folder / name for name in bag.files if name.endswith(".mcap")]
+    if any(_read(file, lacks_channels) for file in files):
+        for file in files:
+            with _damage_of(file):
+                for topic, type_, data in messages_in(file, topics):
+                    rewrite.go_on()
+                    if type_ == TF_MESSAGE:
+                        yield RecordedTopic(topic, type_), data
+        return
     with _reader(bag) as reader:
         connections = [
             connection
             for connection in reader.connections
-            if connection.topic in topics and connection.msgtype == TF_MESSAGE
+            if connection.topic in topics and connection.msgtype in {TF_MESSAGE, _NO_SCHEMA}
         ]
         for connection, _, data in reader.messages(connections=connections) if connections else ():
             rewrite.go_on()
-            yield RecordedTopic(connection.topic, connection.msgtype), bytes(data)
+            yield RecordedTopic(connection.topic, TF_MESSAGE), bytes(data)
 
 
 def write_corrected(bag: Bag, target: Path, rewrite: Rewrite) -> Counter[str]:
@@ -292,8 +330,11 @@ def _write_metadata(bag: Bag, file: Path, per_file: list[Counter[str]], rewrite:
             {**entry, "message_count": each.total()}
             for entry, each in zip(files, per_file, strict=True)
         ]
-    custom = information.get("custom_data") or {}
-    information["custom_data"] = {**custom, **rewrite.provenance}
+    custom = information.get("custom_data")
+    information["custom_data"] = {
+        **(custom if isinstance(custom, dict) else {}),
+        **rewrite.provenance,
+    }
     text = yaml.safe_dump({_INFORMATION: information}, sort_keys=False, allow_unicode=True)
     file.write_text(text, "utf-8")
 

@@ -129,7 +129,12 @@ def _rewrite(arguments: Namespace, plan: Plan, stop: Stop) -> Rewrite:
     from tfcompose.tools.rebag.messages import MessageEditor
     from tfcompose.tools.rebag.rewriting import Rewrite
 
-    renames = pairs(arguments.rename, ":=")
+    renames = {
+        old.removeprefix("/"): new.removeprefix("/")
+        for old, new in pairs(arguments.rename, ":=").items()
+    }
+    if not all((*renames.keys(), *renames.values())):
+        fail("--rename takes the names of two frames: OLD:=NEW", UNREADABLE)
     return Rewrite(
         corrections_of(plan, renames, only_declared=arguments.only_declared),
         MessageEditor(renames, _camera_infos(arguments)),
@@ -177,6 +182,7 @@ def _provenance(arguments: Namespace, plan: Plan) -> dict[str, str]:
                 "overlays": plan.overlays,
                 "rename": arguments.rename,
                 "only_declared": arguments.only_declared,
+                "camera_info": arguments.camera_info,
             }
         ),
     }
@@ -199,6 +205,9 @@ def _corrected(path: Path, target: Path | None, rewrite: Rewrite) -> Counter[str
     from tfcompose.tools.rebag.rewriting import InterruptedRewrite
 
     bag = bag_at(path)
+    if target is not None and bag.information is None and target.suffix != path.suffix:
+        name = target.name + path.suffix
+        reject([_unwritable(str(target), f"{path} is a single file", f"name it {name}")])
     try:
         note_static(bag, rewrite)
         _refuse_other_types(rewrite)
@@ -219,12 +228,12 @@ def _refuse_other_types(rewrite: Rewrite) -> None:
     from tfcompose.foundation.findings import finding
     from tfcompose.tools.rebag.messages import CAMERA_INFO
 
-    calibrations = sorted(topic for topic, type_ in rewrite.types.items() if type_ == CAMERA_INFO)
+    calibrations = sorted(topic for topic, types in rewrite.types.items() if CAMERA_INFO in types)
     advice = f"it has them on {', '.join(calibrations)}" if calibrations else ""
     findings = [
         finding("TF926", f"the bag has no {CAMERA_INFO} on {topic}", None, help=advice)
         for topic in rewrite.messages.camera_infos
-        if topic not in calibrations
+        if not {CAMERA_INFO, ""} & rewrite.types.get(topic, set())
     ]
     if findings:
         reject(findings)
@@ -288,7 +297,7 @@ def warnings_of(unknown: Mapping[str, str], malformed: Mapping[str, int]) -> lis
     """Return findings about messages that could not be corrected.
 
     ``unknown`` contains the message types without a definition, by topic. ``malformed`` contains
-    the numbers of messages that are not TFMessages, by topic.
+    the numbers of messages that could not be decoded, by topic.
     """
     from tfcompose.foundation.findings import finding
 

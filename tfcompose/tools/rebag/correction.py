@@ -45,7 +45,8 @@ class EdgeChange(NamedTuple):
 class TFCorrection:
     """Corrects the TFMessages of a pair of topics (moving, fixed).
 
-    Pass every message of the fixed topic to ``note_static`` before you call ``opening``.
+    Pass every message of the fixed topic to ``note_static`` before you call ``opening``, and, if
+    there are nominal poses, every one of the moving topic to ``note_moving``.
     """
 
     topics: Topics
@@ -67,6 +68,8 @@ class TFCorrection:
     left_moving: Counter[str] = field(default_factory=Counter)
     dropped: Counter[str] = field(default_factory=Counter)
     _recorded: dict[str, SentTransform] = field(default_factory=dict)
+    #: Children with a nominal pose that the bag has on the topic of moving edges.
+    _moving: set[str] = field(default_factory=set)
     _decoder: Decoder = field(default_factory=Decoder)
 
     def note_static(self, data: bytes) -> None:
@@ -79,16 +82,31 @@ class TFCorrection:
             renamed = self._renamed(transform)
             self._recorded[renamed.child] = renamed
 
+    def note_moving(self, data: bytes) -> None:
+        """Store which nominal poses a recorded message of the moving topic has.
+
+        Raises:
+            ValueError: if it is not a TFMessage.
+        """
+        if len(self._moving) < len(self.nominal):
+            children = {self._renamed(transform).child for transform in decode(data)}
+            self._moving |= self.nominal.keys() & set(map(plain_name, children))
+
+    def _unrecorded(self) -> list[PlanEdge]:
+        """Return the edges with a nominal pose that the bag has on neither topic."""
+        return [
+            edge
+            for child, edge in self.nominal.items()
+            if child not in self._recorded and child not in self._moving
+        ]
+
     def opening(self, stamp_ns: int) -> bytes | None:
         """Return the message of the fixed topic that a file of the bag begins with.
 
         It contains the robot file's edges and the recorded fixed edges of earlier files.
         ``stamp_ns`` is their stamp. Return None if there are no such edges.
         """
-        missing = {
-            child: edge for child, edge in self.nominal.items() if child not in self._recorded
-        }
-        sent = [_sent(edge, stamp_ns) for edge in (*self.fixed.values(), *missing.values())]
+        sent = [_sent(edge, stamp_ns) for edge in (*self.fixed.values(), *self._unrecorded())]
         sent += [replace(transform, stamp_ns=stamp_ns) for transform in self.kept.values()]
         return encode(sent) if sent else None
 
@@ -117,11 +135,7 @@ class TFCorrection:
     def changes(self) -> list[EdgeChange]:
         """Return the changes of edges, and an entry for each fixed edge of the robot file."""
         changes = [self._change_of(edge) for edge in self.fixed.values()]
-        changes += [
-            EdgeChange(edge.name, "added")
-            for child, edge in self.nominal.items()
-            if child not in self._recorded
-        ]
+        changes += [EdgeChange(edge.name, "added") for edge in self._unrecorded()]
         changes += [
             EdgeChange(edge, "removed from /tf", transforms=count)
             for edge, count in sorted(self.left_moving.items())

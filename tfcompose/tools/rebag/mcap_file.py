@@ -16,7 +16,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.reader import make_reader
+from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema, Statistics
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap.summary import Summary
@@ -25,7 +25,7 @@ from tfcompose.tools.rebag.mcap_writer import HEAD, MAGIC, McapWriter, bytes_of
 from tfcompose.tools.rebag.recorded_topic import TF_HASH, RecordedTopic
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Collection, Iterator
     from pathlib import Path
     from typing import BinaryIO
 
@@ -85,11 +85,42 @@ def qos_in_mcap(file: Path) -> dict[str, str]:
     return {each.topic: each.metadata.get("offered_qos_profiles", "") for each in channels}
 
 
+def lacks_channels(file: Path) -> bool:
+    """Return whether the summary of a file does not have all channels; rosbags then finds none.
+
+    Raises:
+        McapError: if the file is damaged.
+        OSError: if it cannot be read.
+    """
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    statistics = summary and summary.statistics
+    return bool(summary and statistics and len(summary.channels) != statistics.channel_count)
+
+
+def messages_in(file: Path, topics: Collection[str]) -> Iterator[tuple[str, str, bytes]]:
+    """Yield the topic, the type and the bytes of the messages of these topics, in file order.
+
+    Raises:
+        McapError: if the file is damaged.
+        OSError: if it cannot be read.
+    """
+    with file.open("rb") as stream:
+        messages = NonSeekingReader(stream).iter_messages(topics, log_time_order=False)
+        for schema, channel, message in messages:
+            yield channel.topic, schema.name if schema else "", message.data
+
+
 def _complete_summary(stream: BinaryIO) -> Summary:
-    """Return the summary of a file; read the whole file if its summary lacks channels."""
+    """Return the summary of a file; read the whole file if its summary lacks some."""
     summary = make_reader(stream).get_summary()
     statistics = summary and summary.statistics
-    if summary and statistics and len(summary.channels) == statistics.channel_count:
+    if (
+        summary
+        and statistics
+        and len(summary.channels) == statistics.channel_count
+        and len(summary.schemas) == statistics.schema_count
+    ):
         return summary
     summary, counts, times_ns = Summary(), Counter[int](), [2**64]
     stream.seek(0)

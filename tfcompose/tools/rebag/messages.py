@@ -50,8 +50,8 @@ def camera_info_in(text: str) -> CameraInfo:
     try:
         document = yaml.safe_load(text)
         return CameraInfo(
-            width=int(document["image_width"]),
-            height=int(document["image_height"]),
+            width=_size(document, "image_width"),
+            height=_size(document, "image_height"),
             distortion_model=str(document["distortion_model"]),
             d=_numbers(document, "distortion_coefficients", None),
             k=_numbers(document, "camera_matrix", 9),
@@ -62,8 +62,15 @@ def camera_info_in(text: str) -> CameraInfo:
         raise CameraInfoError(f"it is no YAML: {' '.join(str(error).split())}") from None
     except KeyError as error:
         raise CameraInfoError(f"it has no {error.args[0]}") from None
-    except (TypeError, ValueError, RecursionError) as error:
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
         raise CameraInfoError(str(error) or type(error).__name__) from None
+
+
+def _size(document: Mapping[str, Any], name: str) -> int:
+    size = int(document[name])
+    if not 0 <= size < 2**32:
+        raise ValueError(f"{name} is {size}")
+    return size
 
 
 def _numbers(document: Mapping[str, Any], name: str, count: int | None) -> tuple[float, ...]:
@@ -87,7 +94,10 @@ class MessageEditor:
     changed: Counter[str] = field(default_factory=Counter)
 
     def editor_of(self, channel: RecordedTopic) -> Callable[[bytes], bytes] | None:
-        """Return a function that changes a message of the topic; None if no message changes."""
+        """Return a function that changes a message of the topic; None if no message changes.
+
+        The function raises a ValueError for a message that it cannot decode.
+        """
         info = self.camera_infos.get(channel.topic)
         if channel.type != CAMERA_INFO:
             info = None
@@ -104,7 +114,7 @@ class MessageEditor:
         def edit(data: bytes) -> bytes:
             if info is None and not any(name in data for name in old_names):
                 return data
-            message = codec.store.deserialize_cdr(data, channel.type)
+            message = codec.decode(data, channel.type)
             changed = bool(self.renames) and codec.rename(message, channel.type, self.renames)
             changed = (info is not None and _set_camera_info(message, info)) or changed
             if not changed:
@@ -121,6 +131,17 @@ class Codec:
 
     store: Typestore
     _has_frame: dict[str, bool] = field(default_factory=dict)
+
+    def decode(self, data: bytes, type_: str) -> Any:
+        """Return the message of this type.
+
+        Raises:
+            ValueError: if it is none.
+        """
+        try:
+            return self.store.deserialize_cdr(data, type_)
+        except Exception as error:  # the library raises anything on foreign bytes
+            raise ValueError(str(error)) from error
 
     def names_a_frame(self, type_: str) -> bool:
         """Return whether messages of the type contain a frame name, at any depth."""

@@ -72,8 +72,8 @@ def run(arguments: Namespace) -> int:
         rewrite = from_bag(lambda: _read(Path(arguments.bag), plan, stop))
         if rewrite is None:
             return INTERRUPTED
-        command = _command(arguments.bag, [topics[1] for topics in rewrite.corrections])
-        command += arguments.options
+        static_topics = [topics[1] for topics in rewrite.corrections]
+        command = _command(arguments.bag, static_topics, arguments.options)
         print(shlex.join(command), flush=True)
         on_tf = {edge for each in rewrite.corrections.values() for edge in each.left_moving}
         print_findings(warnings_of(on_tf), sys.stderr)
@@ -105,13 +105,27 @@ def _read(path: Path, plan: Plan, stop: Stop) -> Rewrite | None:
         check_bag(bag, rewrite)
     except InterruptedRewrite:
         return None
+    rewrite.compress = None  # its messages are published, and not stored
     return rewrite
 
 
-def _command(bag: str, static_topics: Sequence[str]) -> list[str]:
-    """Return the command that plays the bag with remapped fixed edges."""
+def _command(bag: str, static_topics: Sequence[str], options: Sequence[str]) -> list[str]:
+    """Return the command that plays the bag with remapped fixed edges and the user's options.
+
+    Of several ``--remap`` ros2 bag play takes the last, so the user's rules join these.
+    """
     rules = [f"{topic}:={topic}_recorded" for topic in static_topics]
-    return ["ros2", "bag", "play", bag, "--remap", *rules]
+    remaining: list[str] = []
+    is_rule = False
+    for option in options:
+        if option.startswith("-"):
+            name, _, rule = option.partition("=")
+            is_rule = name in {"--remap", "-m"}
+            rules += [rule] if is_rule and rule else []
+            remaining += [] if is_rule else [option]
+        else:
+            (rules if is_rule else remaining).append(option)
+    return ["ros2", "bag", "play", bag, "--remap", *rules, *remaining]
 
 
 def warnings_of(edges: Collection[str]) -> list[Finding]:

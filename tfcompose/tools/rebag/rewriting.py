@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import yaml
@@ -47,13 +48,13 @@ class Rewrite:
     metadata_version: int = QOS_BY_WORDS
     #: The QoS of each topic's publishers, in the format of the bag.
     qos: dict[str, str] = field(default_factory=dict)
-    #: The type of each topic of the bag.
-    types: dict[str, str] = field(default_factory=dict)
+    #: The types of each topic of the bag; an empty one is unknown.
+    types: dict[str, set[str]] = field(default_factory=dict)
     #: A function that decompresses a message, if the bag compresses each message separately.
     expand: Callable[[bytes], bytes] | None = None
     #: A function that compresses a message in such a bag.
     compress: Callable[[bytes], bytes] | None = None
-    #: The number of TFMessages that could not be decoded, by topic. They are copied without a
+    #: The number of messages that could not be decoded, by topic. They are copied without a
     #: change.
     malformed: Counter[str] = field(default_factory=Counter)
 
@@ -75,9 +76,11 @@ class Rewrite:
 
     def edit_of(self, channel: RecordedTopic) -> Edit | None:
         """Return a function that changes the messages of a channel; None if none changes."""
-        edit = self.tf_edit_of(channel) or self.messages.editor_of(channel)
-        if edit is None or self.expand is None or self.compress is None:
-            return edit
+        edit = self._tf_edit_of(channel) or self.messages.editor_of(channel)
+        if edit is None:
+            return None
+        if self.expand is None or self.compress is None:
+            return self._tolerant(edit, channel.topic)
         expand, compress = self.expand, self.compress
 
         def edit_compressed(data: bytes) -> bytes | None:
@@ -87,7 +90,19 @@ class Rewrite:
                 return None if after is None else data
             return compress(after)
 
-        return edit_compressed
+        return self._tolerant(edit_compressed, channel.topic)
+
+    def _tolerant(self, edit: Edit, topic: str) -> Edit:
+        """Return a function that counts a message that cannot be decoded, and keeps it."""
+
+        def tolerant(data: bytes) -> bytes | None:
+            try:
+                return edit(data)
+            except ValueError:
+                self.malformed[topic] += 1
+                return data
+
+        return tolerant
 
     def openings(self, stamp_ns: int) -> list[tuple[RecordedTopic, bytes]]:
         """Return the messages with which a file begins, stamped with a time in nanoseconds."""
@@ -100,20 +115,15 @@ class Rewrite:
         return messages
 
     def tf_edit_of(self, channel: RecordedTopic) -> Edit | None:
-        """Return a function that changes the TFMessages of a channel; None if none changes."""
+        """Return a function that changes the TFMessages of a channel; None if none changes.
+
+        The messages are not compressed.
+        """
+        edit = self._tf_edit_of(channel)
+        return edit and self._tolerant(edit, channel.topic)
+
+    def _tf_edit_of(self, channel: RecordedTopic) -> Edit | None:
         for topics, correction in self.corrections.items():
             if channel.topic in topics and channel.type == TF_MESSAGE:
-                return self._tf_edit(correction, channel.topic)
+                return partial(correction.corrected, static=channel.topic == topics[1])
         return None
-
-    def _tf_edit(self, correction: TFCorrection, topic: str) -> Edit:
-        static = topic == correction.topics[1]
-
-        def edit(data: bytes) -> bytes | None:
-            try:
-                return correction.corrected(data, static=static)
-            except ValueError:
-                self.malformed[topic] += 1
-                return data
-
-        return edit

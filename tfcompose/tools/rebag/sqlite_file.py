@@ -7,6 +7,7 @@ from collections import Counter
 from contextlib import closing
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.reading import exists
 from tfcompose.tools.rebag.recorded_topic import TF_HASH, RecordedTopic
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def rewrite_sqlite(source: Path, target: Path, rewrite: Rewrite) -> Counter[str]
         OSError: if the source cannot be read.
     """
     with (
-        closing(sqlite3.connect(f"{source.resolve().as_uri()}?mode=ro", uri=True)) as old,
+        closing(_open(source)) as old,
         closing(sqlite3.connect(target, isolation_level=None)) as new,
     ):
         old.backup(new)
@@ -55,11 +56,19 @@ def qos_in_sqlite(file: Path) -> dict[str, str]:
     Raises:
         sqlite3.Error: if the file is damaged.
     """
-    with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True)) as database:
+    with closing(_open(file)) as database:
         columns = [row[1] for row in database.execute("PRAGMA table_info(topics)")]
         if "offered_qos_profiles" not in columns:
             return {}
         return dict(database.execute("SELECT name, offered_qos_profiles FROM topics"))
+
+
+def _open(file: Path) -> sqlite3.Connection:
+    """Open a database for reading, without making a file beside it."""
+    log = file.with_name(f"{file.name}-wal")
+    is_complete = not (exists(log) and log.stat().st_size)  # else SQLite needs its shared memory
+    options = "mode=ro&immutable=1" if is_complete else "mode=ro"
+    return sqlite3.connect(f"{file.resolve().as_uri()}?{options}", uri=True)
 
 
 def _edit_messages(database: sqlite3.Connection, rewrite: Rewrite) -> None:

@@ -10,7 +10,7 @@ from tfcompose.foundation.signals import Stop
 from tfcompose.tf.bags import Recording
 from tfcompose.tools.treetest.case import Case
 from tfcompose.tools.treetest.cases import CaseLoader
-from tfcompose.tools.treetest.faults import inject
+from tfcompose.tools.treetest.faults import RecordedFaults
 from tfcompose.tools.treetest.running import run_case
 
 ROBOT = """\
@@ -89,12 +89,37 @@ def test_each_fault_is_found_and_the_clean_recording_passes(
     assert {each.code for each in findings} == {"TF931"}, findings
 
 
+@pytest.mark.parametrize(
+    ("injection", "expect"),
+    [each for each in FAULTS if "laser" in each[0] and "drop" not in each[0]],
+)
+def test_a_fault_that_begins_later_changes_the_fixed_edges_before(
+    injection: str, expect: str, folder: Path
+) -> None:
+    case = case_of(folder, f"{injection}, at: 1 s", expect)
+    assert {each.code for each in run_case(case, Stop()).findings} == {"TF931"}
+
+
+@pytest.mark.parametrize(("at", "codes"), [("2.9 s", []), ("3 s", ["TF932"]), ("9 s", ["TF932"])])
+def test_a_fault_begins_before_the_recording_ends(at: str, codes: list[str], folder: Path) -> None:
+    injection = f"late: {{edge: odom → base_link, by: 1 ms}}, at: {at}"
+    findings = run_case(case_of(folder, injection, "complete: 1 s"), Stop()).findings
+    assert [each.code for each in findings] == codes
+    for each in findings:
+        assert each.span is not None
+        assert each.span.line == 6
+        text = f"    inject: {{{injection}}}"
+        assert each.span.column == text.index(at) + 1
+
+
 @pytest.mark.parametrize("injection", dict.fromkeys(injection for injection, _ in FAULTS))
 def test_a_fault_keeps_the_order_and_the_messages_before_it(injection: str, folder: Path) -> None:
     case = case_of(folder, f"{injection}, at: 1 s", "complete: 1 s")
     recorded = list(Recording(str(folder / "bag")).messages(PAIR))
-    changed = list(inject(recorded, case.spec.inject, case.plan))
-    assert changed == list(inject(recorded, case.spec.inject, case.plan))
+    changed, again = (
+        list(RecordedFaults(case.spec.inject, case.plan).inject(recorded)) for _ in range(2)
+    )
+    assert changed == again
     times = [each.received_ns for each in changed]
     assert times == sorted(times)
     begin_ns = round((START_S + 1.0) * 1e9)
@@ -110,7 +135,7 @@ def test_half_of_the_dropped_messages_are_left_and_all_delayed_ones(folder: Path
         case = case_of(folder, injection, "complete: 1 s")
         return [
             (each.received_ns, each.rows)
-            for each in inject(recorded, case.spec.inject, case.plan)
+            for each in RecordedFaults(case.spec.inject, case.plan).inject(recorded)
             if each.rows and each.rows[0][1] == "base_link"
         ]
 

@@ -13,7 +13,7 @@ from tfcompose.tf.bags import RecordedMessage
 from tfcompose.tf.ros.tf_codec import Row
 from tfcompose.tools.treetest.case import Case
 from tfcompose.tools.treetest.cases import CaseLoader
-from tfcompose.tools.treetest.faults import inject
+from tfcompose.tools.treetest.faults import RecordedFaults
 from tfcompose.tools.treetest.relay_request import RelayRequest, published_topics, redirect
 from tfcompose.tools.treetest.relayed_messages import RelayedMessages
 from tfcompose.tools.treetest.relayed_plan import relayed_processes, with_relays
@@ -185,7 +185,7 @@ def test_a_relay_changes_messages_as_in_a_recording(tmp_path: Path) -> None:
         for each in sent
         for changed in relay.take(each.rows or (), static=False, now_ns=each.received_ns)
     ]
-    assert live == list(inject(sent, case.spec.inject, case.plan))
+    assert live == list(RecordedFaults(case.spec.inject, case.plan).inject(sent))
     assert len({each.received_ns % 10**7 for each in live}) > 20
 
 

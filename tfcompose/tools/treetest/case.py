@@ -43,12 +43,20 @@ class Case:
 
     def span(self, *steps: str | int) -> Span:
         """Return the place of a key below the case, or of the nearest one around it."""
-        path = (*self.path, *steps)
+        path = self._path_of(steps)
         return self.source.key_span(path) if self.source.has_key(path) else self.value_span(*steps)
 
     def value_span(self, *steps: str | int) -> Span:
         """Return the place of a value below the case."""
-        return self.source.span_of((*self.path, *steps))
+        return self.source.span_of(self._path_of(steps))
+
+    def _path_of(self, steps: Iterable[str | int]) -> SpecPath:
+        """Return the path of steps below the case; one item in place of a list has no number."""
+        path = self.path
+        for step in steps:
+            if isinstance(step, str) or self.source.has((*path, step)):
+                path = (*path, step)
+        return path
 
 
 def variant_of(profiles: Iterable[str], *, trust: bool, starts: bool) -> Namespace:

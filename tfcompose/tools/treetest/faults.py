@@ -44,21 +44,30 @@ _SECOND_NS = 1_000_000_000
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 
 
-def inject(
-    messages: Iterable[RecordedMessage], injections: Sequence[InjectionSpec], plan: Plan
-) -> Iterator[RecordedMessage]:
-    """Yield the messages with the faults of all injections, in the order of their arrival.
+class RecordedFaults:
+    """Faults in a recording, each from a time after its first message on."""
 
-    What is delayed beyond the recording's end was not recorded.
-    """
-    injectors = [Injector(fault_of(injection, plan)) for injection in injections]
-    is_begun = False
-    for message in messages:
-        if not is_begun:
-            is_begun = True
-            for injector, injection in zip(injectors, injections, strict=True):
-                injector.begin_ns = message.received_ns + round((injection.at or 0) * _SECOND_NS)
-        yield from pass_through(injectors, message)
+    def __init__(self, injections: Sequence[InjectionSpec], plan: Plan) -> None:
+        self._injectors = {
+            _RecordingInjector(fault_of(injection, plan)): round((injection.at or 0) * _SECOND_NS)
+            for injection in injections
+        }
+        #: From the first message to the last so far, in nanoseconds.
+        self.length_ns = 0
+
+    def inject(self, messages: Iterable[RecordedMessage]) -> Iterator[RecordedMessage]:
+        """Yield the messages with all faults, in the order of their arrival.
+
+        What is delayed beyond the recording's end was not recorded.
+        """
+        first_ns: int | None = None
+        for message in messages:
+            if first_ns is None:
+                first_ns = message.received_ns
+                for injector, at_ns in self._injectors.items():
+                    injector.begin_ns = first_ns + at_ns
+            self.length_ns = message.received_ns - first_ns
+            yield from pass_through(self._injectors, message)
 
 
 class Injector:
@@ -73,14 +82,38 @@ class Injector:
 
     def take(self, message: RecordedMessage) -> None:
         """Take a message, not earlier than those before. One without transforms passes time."""
-        is_faulty = self.begin_ns is not None and message.received_ns >= self.begin_ns
-        for changed in self._fault(message) if is_faulty else (message,):
-            heapq.heappush(self._waiting, (changed.received_ns, next(self._numbers), changed))
+        self._push(self._fault(message) if self._is_faulty(message) else (message,))
+
+    def _is_faulty(self, message: RecordedMessage) -> bool:
+        return self.begin_ns is not None and message.received_ns >= self.begin_ns
+
+    def _push(self, messages: Iterable[RecordedMessage]) -> None:
+        for each in messages:
+            heapq.heappush(self._waiting, (each.received_ns, next(self._numbers), each))
 
     def until(self, time_ns: int) -> Iterator[RecordedMessage]:
         """Yield what has arrived by a time, in nanoseconds."""
         while self._waiting and self._waiting[0][0] <= time_ns:
             yield heapq.heappop(self._waiting)[2]
+
+
+class _RecordingInjector(Injector):
+    """Also injects a fault that begins into the fixed edges before: a recording has them once."""
+
+    def __init__(self, fault: Fault) -> None:
+        super().__init__(fault)
+        self._latched: dict[Topics, dict[str, Row]] = {}
+
+    def take(self, message: RecordedMessage) -> None:
+        if self._is_faulty(message):
+            for topics, rows in self._latched.items():
+                sent = replace(message, topics=topics, rows=tuple(rows.values()), static=True)
+                self._push(each for each in self._fault(sent) if each != sent)
+            self._latched.clear()
+        elif message.static:
+            latched = self._latched.setdefault(message.topics, {})
+            latched |= {_child(row): row for row in message.rows or ()}
+        super().take(message)
 
 
 def pass_through(

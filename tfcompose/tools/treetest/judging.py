@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, TypeVar
 
@@ -18,7 +17,7 @@ from tfcompose.guard.verdict.verify import verify
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tf.bags import BagError, BagFeed
 from tfcompose.tf.live.feed import follow
-from tfcompose.tools.treetest.faults import inject
+from tfcompose.tools.treetest.faults import RecordedFaults
 from tfcompose.tools.treetest.golden import GoldenProbe, judge_likeness, read_golden
 from tfcompose.tools.treetest.injections import split_pair
 from tfcompose.tools.treetest.joints import (
@@ -28,6 +27,7 @@ from tfcompose.tools.treetest.joints import (
     judge_motion,
 )
 from tfcompose.tools.treetest.replay import (
+    SECOND_NS,
     AgeProbe,
     LookupProbe,
     MessageLog,
@@ -59,15 +59,29 @@ def judge_recording(case: Case, bag: str, stop: Stop, folder: Path | None) -> li
     With any, files about the tree are written to the folder.
     """
     judge = CaseJudge(case, keeps=folder is not None)
-    rewrite = partial(inject, injections=case.spec.inject, plan=case.plan)
+    faults = RecordedFaults(case.spec.inject, case.plan)
     try:
-        follow(BagFeed(bag, judge.trees, rewrite), stop)
+        follow(BagFeed(bag, judge.trees, faults.inject), stop)
     except BagError as error:
         return [finding("TF907", str(error), case.value_span("bag"), help=error.help)]
-    findings = list(judge.findings())
+    findings = list(_late_faults(case, faults.length_ns / SECOND_NS) or judge.findings())
     if findings:
         judge.write_evidence(folder)
     return findings
+
+
+def _late_faults(case: Case, length_s: float) -> list[Finding]:
+    """Return a finding for each fault that would begin after the end of a recording."""
+    return [
+        finding(
+            "TF932",
+            f"{each.kind} would begin at {each.at:g} s; the recording ends after {length_s:.4g} s",
+            case.value_span("inject", index, "at"),
+            help="begin it earlier, or take a longer recording",
+        )
+        for index, each in enumerate(case.spec.inject)
+        if each.at is not None and each.at > length_s
+    ]
 
 
 class CaseJudge:

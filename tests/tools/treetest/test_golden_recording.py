@@ -1,13 +1,15 @@
 """``expect: {like: golden.mcap}``: a tree against a recording of how it was."""
 
 from collections.abc import Iterable
-from math import cos, sin
+from math import cos, inf, nan, radians, sin
 from pathlib import Path
 
 import pytest
 
 from tests.support.bags import UP, Sent, write_bag
 from tests.support.cli import tfcompose_in
+from tfcompose.foundation.geometry import Offset, Pose
+from tfcompose.tools.treetest.golden import EdgePath
 
 ROBOT = """\
 tfcompose: 1
@@ -128,3 +130,37 @@ def test_a_golden_recording_that_is_not_there_is_refused(
     done = tfcompose_in(tmp_path, "test")
     assert done.returncode == 2
     assert f"cart.test.yaml:{expected}" in done.stderr, done.stderr
+
+
+def turned(degrees: float, x: float = 0.0) -> Pose:
+    half = radians(degrees) / 2
+    return Pose((x, 0.0, 0.0), (0.0, 0.0, sin(half), cos(half)))
+
+
+@pytest.mark.parametrize(
+    ("path", "pose", "xyz_m", "degrees"),
+    [
+        ([turned(0), turned(10, 3e-6)], turned(5, -2e-6), 4e-6, 0.0),
+        ([turned(0, 2e-6), turned(10)], turned(7, 9e-6), 9e-6, 0.0),
+        ([turned(0), turned(10)], turned(-1), 0.0, 1.0),
+        ([turned(0), turned(10), turned(0)], turned(11), 0.0, 1.0),
+        ([turned(0)], turned(1), 0.0, 1.0),
+        ([turned(0), turned(0, 1.0)], turned(0.0, 0.25), 0.0, 0.0),
+        ([turned(0), turned(0, 1.0)], turned(0.0, 1.5), 0.5, 0.0),
+        ([turned(0), turned(0, 1e200)], turned(0.0, 5e199), 0.0, 0.0),
+        ([turned(0), turned(0, 1.0)], turned(0.0, 1e200), 1e200, 0.0),
+    ],
+)
+def test_a_pose_is_compared_with_the_nearest_on_the_way(
+    path: list[Pose], pose: Pose, xyz_m: float, degrees: float
+) -> None:
+    offset, _ = EdgePath(static=False, poses=path).nearest(pose, Offset(1e-3, radians(0.1)), 0)
+    assert offset.xyz_m <= xyz_m + 1e-9
+    assert offset.rot_rad == pytest.approx(radians(degrees), abs=1e-9)
+
+
+@pytest.mark.parametrize("x", [nan, inf])
+def test_transforms_that_tf2_rejects_are_on_no_path(x: float, tmp_path: Path) -> None:
+    moving: Sent = ("/tf", 1.0, "odom", "base_link", 1.0, (x, 0.0, 0.0), UP)
+    (head,) = compare(tmp_path, [LASER, moving])
+    assert "odom → base_link" in head

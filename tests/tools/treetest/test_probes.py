@@ -1,11 +1,15 @@
 """Measurements of a case, against a probe that looks up after every message."""
 
+from math import nan
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.foundation.geometry import Offset, Pose
+from tfcompose.model.plan import PlanJoint
 from tfcompose.tf.tf2.pose_buffer import PoseBuffer
+from tfcompose.tools.treetest.joints import JointProbe
 from tfcompose.tools.treetest.replay import Arrival, PoseProbe, ProbedTree, Timeline
 
 FRAMES = "abcd"
@@ -48,6 +52,17 @@ def pose_probe(kind: type[PoseProbe]) -> PoseProbe:
 
 def outcome(probe: PoseProbe) -> tuple[Pose | None, float | None, float]:
     return probe.worst, probe.beyond_s, probe.elapsed_s
+
+
+def test_a_joint_moves_past_transforms_that_tf2_rejects() -> None:
+    joint = PlanJoint("joint", "prismatic", (1.0, 0.0, 0.0))
+    probe = JointProbe("a", "b", joint, Pose(), Offset(0.1, 0.1))
+    tree = ProbedTree(Timeline())
+    tree.probes.append(probe)
+    for now_s, y, w in [(1, nan, 1.0), (2, 0.0, nan), (3, 0.0, 1.0), (4, 2.0, 1.0)]:
+        row = ("a", "/b", now_s, 0, 0.0, y, 0.0, 0.0, 0.0, 0.0, w)
+        tree.take([row], static=False, gid=None, received_ns=now_s * 10**9)
+    assert (probe.offset.xyz_m, probe.elapsed_s) == (2.0, 3.0)
 
 
 @given(messages)

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable, Iterable
+from math import nan
 from pathlib import Path
 from subprocess import CompletedProcess
 from xml.etree import ElementTree as ET
@@ -85,6 +86,7 @@ RATE = "edges: {odom → base_link: {rate: [45 Hz, 55 Hz]}}"
 AGE = "edges:\n  odom -> base_link: {age: 50 ms}"
 POSE = "pose: {base_link → laser: {xyz: [0.24, 0, 0.3], rpy: [0, 0, 90 deg], within: 1 mm}}"
 LOOKUPS = "lookups:\n  - {from: odom, to: laser, at: [1 s, 2 s, 3 s]}"
+REJECTED: list[Sent] = [(*row[:5], (nan, 0.0, 0.0), UP) for row in drive()]
 SECOND: list[Sent] = [("/tf", 1.0, "map", "base_link", 1.0, (0.0, 0.0, 0.0), UP)]
 
 
@@ -116,6 +118,7 @@ def test_a_met_expectation_passes(expect: str, judge: Judge) -> None:
         (RATE, thinned(DRIVE), "6:40", ["25 Hz"]),
         (RATE, gap(DRIVE, 1.0, 2.5), "6:40", ["2.504 s"]),
         (RATE, [LASER], "6:15", ["odom → base_link"]),
+        (RATE, [LASER, *REJECTED], "6:15", ["odom → base_link"]),
         (RATE, DRIVE[:2], "6:40", ["1 message"]),
         ("edges:\n  odom → base_link: {rate: [10 Hz, 20 Hz]}", DRIVE, "7:34", ["50 Hz"]),
         (AGE, [LASER, *drive(late_s=0.08)], "7:34", ["80 ms"]),

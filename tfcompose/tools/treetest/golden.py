@@ -11,21 +11,18 @@ from tfcompose.foundation.geometry import Offset, Pose, angle_between, norm, nor
 from tfcompose.foundation.numbers import numbers
 from tfcompose.tf.bags import Recording
 from tfcompose.tf.tf2.poses import between
+from tfcompose.tools.treetest.replay import accepted_pose, names_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.tf.ros.tf_codec import Row
     from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.replay import Arrival
 
     Topics = tuple[str, str]
     #: Parent and child.
     Pair = tuple[str, str]
-
-#: What is no motion, in metres: then the rotation says where on a segment a pose is.
-_NO_MOTION_M = 1e-6
 
 
 @dataclass(slots=True)
@@ -43,7 +40,7 @@ class EdgePath:
         """
         best, nearest = None, begin
         for index in _outward(begin, max(1, len(self.poses) - 1)):
-            offset = _offset_of_segment(pose, self.poses[index : index + 2])
+            offset = _offset_of_segment(pose, self.poses[index : index + 2], within)
             if not offset.beyond(within):
                 return offset, index
             if best is None or _severity(offset, within) < _severity(best, within):
@@ -61,18 +58,27 @@ def _outward(begin: int, count: int) -> Iterator[int]:
             yield begin - step
 
 
-def _offset_of_segment(pose: Pose, ends: list[Pose]) -> Offset:
-    """Return how far a pose is from the nearest one on the way between one or two poses."""
+def _offset_of_segment(pose: Pose, ends: list[Pose], within: Offset) -> Offset:
+    """Return how far a pose is from the nearest one on the way between one or two poses.
+
+    The nearest by position and that by rotation are tried, and the two ends.
+    """
     first, last = ends[0], ends[-1]
+    parts = [0.0, 1.0]
     way = tuple(b - a for a, b in zip(first.xyz, last.xyz, strict=True))
-    length = norm(way)
-    if length > _NO_MOTION_M:
-        ahead = (p - a for a, p in zip(first.xyz, pose.xyz, strict=True))
-        part = sum(a * b for a, b in zip(ahead, way, strict=True)) / length**2
-    else:
-        angle = angle_between(first.quat_xyzw, last.quat_xyzw)
-        part = angle_between(first.quat_xyzw, pose.quat_xyzw) / angle if angle else 0.0
-    values = between((*first.xyz, *first.quat_xyzw, *last.xyz, *last.quat_xyzw), _clamp(part))
+    if length := norm(way):  # whose square may be too large for a number
+        ahead = ((p - a) / length for a, p in zip(first.xyz, pose.xyz, strict=True))
+        parts.append(sum(a * (b / length) for a, b in zip(ahead, way, strict=True)))
+    if angle := angle_between(first.quat_xyzw, last.quat_xyzw):
+        parts.append(angle_between(first.quat_xyzw, pose.quat_xyzw) / angle)
+    offsets = (_offset_at(_clamp(part), pose, (first, last)) for part in parts)
+    return min(offsets, key=lambda offset: _severity(offset, within))
+
+
+def _offset_at(part: float, pose: Pose, ends: tuple[Pose, Pose]) -> Offset:
+    """Return how far a pose is from the one at a part, 0 to 1, of the way between two."""
+    first, last = ends
+    values = between((*first.xyz, *first.quat_xyzw, *last.xyz, *last.quat_xyzw), part)
     x, y, z, *quat = values
     return offset_of(Pose((x, y, z), normalise((quat[0], quat[1], quat[2], quat[3]))), pose)
 
@@ -95,26 +101,16 @@ def read_golden(bag: str, pairs: tuple[Topics, ...]) -> Mapping[Topics, Mapping[
     trees: dict[Topics, dict[Pair, EdgePath]] = {pair: {} for pair in pairs}
     for message in Recording(bag).messages(*pairs):
         for row in message.rows or ():
-            pose = _pose(row)
+            pair, pose = names_of(row), accepted_pose(row)
             if pose is None:
                 continue
             tree = trees[message.topics]
-            path = tree.setdefault(_names(row), EdgePath(static=message.static))
+            path = tree.setdefault(pair, EdgePath(static=message.static))
             if path.static or message.static:
                 path.poses.clear()
             path.static = message.static
             path.poses.append(pose)
     return trees
-
-
-def _names(row: Row) -> Pair:
-    return row[0].removeprefix("/"), row[1].removeprefix("/")
-
-
-def _pose(row: Row) -> Pose | None:
-    """Return the pose of a transform; None for one that tf2 drops."""
-    quat_xyzw = row[7:11]
-    return Pose(row[4:7], normalise(quat_xyzw)) if norm(quat_xyzw) else None
 
 
 @dataclass(slots=True)
@@ -151,7 +147,7 @@ class GoldenProbe:
     def take(self, arrival: Arrival) -> None:
         """Compare the transforms of a message."""
         for row in arrival.rows:
-            pair, pose = _names(row), _pose(row)
+            pair, pose = names_of(row), accepted_pose(row)
             if pose is None:
                 continue
             edge = self.observed.setdefault(
@@ -177,7 +173,8 @@ def judge_likeness(case: Case, probe: GoldenProbe) -> Iterator[Finding]:
     for pair, path in probe.golden.items():
         edge = " → ".join(pair)
         if pair not in probe.observed:
-            yield finding("TF931", f"{edge}: expected as in {name}; it never came", span)
+            message = f"{edge}: expected as in {name}; no transform that tf2 accepts came"
+            yield finding("TF931", message, span)
             continue
         if probe.observed[pair].static != path.static:
             kinds = ("moving", "fixed")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.findings import Note, finding
 from tfcompose.foundation.geometry import Offset, Pose, norm, offset_of
 from tfcompose.foundation.numbers import numbers
+from tfcompose.tools.treetest.replay import accepted_pose, names_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,11 +39,10 @@ class JointProbe:
     def take(self, arrival: Arrival) -> None:
         """Compare the edge's transforms in a message with the joint's motion."""
         for row in arrival.rows:
-            names = row[0].removeprefix("/"), row[1].removeprefix("/")
-            if self.pose is not None or names != (self.parent, self.child):
+            if self.pose is not None or names_of(row) != (self.parent, self.child):
                 continue
-            pose = Pose(row[4:7], row[7:11])
-            if not norm(pose.quat_xyzw):
+            pose = accepted_pose(row)
+            if pose is None:
                 continue
             motion = self.origin.inverse() @ pose
             offset = offset_of(self.joint.nearest(motion), motion)

@@ -305,9 +305,9 @@ class CaseJudge:
         elif expected.owner is not None:
             yield from self._judge_senders(pair, planned)
         state = self._state(parent, child)
-        if state is None:
-            span = self.case.span(*at)
-            yield finding("TF931", f"{pair}: expected the edge; it never came", span)
+        if state is None or not state.stream.is_taken:
+            reason = "it never came" if state is None else "tf2 rejects every transform of it"
+            yield finding("TF931", f"{pair}: expected the edge; {reason}", self.case.span(*at))
             return
         if expected.rate is not None:
             yield from self._judge_rate(pair, expected.rate, state)

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING, Protocol
 
-from tfcompose.foundation.geometry import Offset, Pose, offset_of
+from tfcompose.foundation.geometry import Offset, Pose, normalise, offset_of
 from tfcompose.tf.live.edges import TreeObserver
 from tfcompose.tf.tf2 import TransformException
+from tfcompose.tf.tf2.exceptions import rejection_of
 from tfcompose.tf.tf2.pose_buffer import PoseBuffer
 
 if TYPE_CHECKING:
@@ -19,6 +20,19 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.tf_codec import Row
 
 SECOND_NS = 1_000_000_000
+
+
+def names_of(row: Row) -> tuple[str, str]:
+    """Return the parent and the child of a transform, as tf2 stores them."""
+    return row[0].removeprefix("/"), row[1].removeprefix("/")
+
+
+def accepted_pose(row: Row) -> Pose | None:
+    """Return the pose of a transform; None for one that tf2 rejects."""
+    pose = row[4:11]
+    if rejection_of(*names_of(row), pose) is not None:
+        return None
+    return Pose(row[4:7], normalise(row[7:11]))
 
 
 @dataclass(slots=True)

@@ -308,6 +308,17 @@ def count(text: str) -> int:
     return int(text)
 
 
+def positive_count(text: str) -> int:
+    """Parse an integer that is 1 or more.
+
+    Raises:
+        ArgumentTypeError: if the text is not such an integer.
+    """
+    if not (number := count(text)):
+        raise ArgumentTypeError(f"{text} is not a whole number of 1 or more")
+    return number
+
+
 def _number(text: str) -> float | None:
     try:
         value = float(text)

@@ -231,6 +231,11 @@ def test_a_case_has_the_profile_with_which_the_robot_ran(judge: Judge) -> None:
         ("lookups:\n  - {from: odm, to: laser, at: 1 s}", "7:18: error[TF930]", "odom"),
         ("findings:\n  - {code: TF8031}", "7:18: error[TF106]", "TF803"),
         ("{}", "6:7: error[TF106]", "findings:"),
+        ("edges: {}", "6:7: error[TF106]", "findings:"),
+        ("pose: {}\nlookups: []", "6:7: error[TF106]", "findings:"),
+        ("lookups:\n  - {from: odom, to: laser, at: []}", "7:39: error[TF106]", "1 s"),
+        ("like: bag\nwithin: [1 mm, -1 deg]", "7:15: error[TF106]", "0.1 deg"),
+        ("like: bag\nwithin: -1 mm", "7:15: error[TF106]", "30 cm"),
     ],
 )
 def test_a_wrong_test_file_is_refused_with_a_way_out(
@@ -279,6 +284,8 @@ def test_a_folder_without_test_files_and_a_k_without_cases_exit_with_2(
     assert judge("findings: []", DRIVE, "-k", "park").returncode == 2
     assert tfcompose_in(tmp_path, "test", "-k", "DRIV").returncode == 0
     assert tfcompose_in(tmp_path, "test", "none.test.yaml").returncode == 2
+    done = tfcompose_in(tmp_path, "test", "-j", "0")
+    assert (done.returncode, done.stderr.count("Traceback")) == (2, 0)
 
 
 def test_reports_for_ci_have_each_case_and_the_line_of_the_expectation(

@@ -3,8 +3,9 @@
 Run the cases of FILE, or of all files below a folder that end in .test.yaml. Each case starts the
 robot in a ROS domain of its own, or replays a recording, and compares the tree with what the case
 expects: completeness, rates, ages, poses, lookups and findings. A failed expectation is printed at
-its line, with what was observed and when. Exit 0 if all cases pass, 1 if one fails, 2 if a test
-file, a robot file or a recording is wrong; then no case runs.
+its line, with what was observed and when. Exit 0 if all cases pass; 1 if one fails, also because
+its recording has no TF; 2 if a test file or a robot file is wrong, or a recording cannot be
+opened: then no case runs.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_format, add_trust, count
+from tfcompose.cli.options import add_format, add_trust, positive_count
 from tfcompose.cli.terminal import (
     INTERRUPTED,
     UNREADABLE,
@@ -51,7 +52,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-j",
         "--jobs",
-        type=count,
+        type=positive_count,
         default=1,
         metavar="N",
         help="run up to N cases at the same time; default: 1",

@@ -29,14 +29,31 @@ def _is_share(value: float) -> float:
     return value
 
 
+def _is_possible_rate(value: float) -> float:
+    if value > _MOST_HZ:
+        raise invalid("TF106", f"{value:g} Hz is faster than a fault can send", "at most 10 kHz")
+    return value
+
+
+def _is_possible_shift(value: float) -> float:
+    if value > _MOST_S:
+        raise invalid("TF106", f"{value:g} s is too long to shift a stamp", "at most 1000000 s")
+    return value
+
+
+#: The greatest rate, and the greatest shift: seconds of a stamp are a number of 32 bits.
+_MOST_HZ, _MOST_S = 10_000, 1_000_000
+
 Share = Annotated[Number, AfterValidator(_is_share)]
+SentRate = Annotated[Rate, AfterValidator(_is_possible_rate)]
+Shift = Annotated[Duration, AfterValidator(_is_possible_shift)]
 
 
 class PublishSpec(Rotated):
     """A node that publishes an edge on /tf."""
 
     edge: FramePair = key(..., "the edge that it publishes", "odom → base_link")
-    rate: Rate = key(50.0, "its rate; default: 50 Hz", "50 Hz")
+    rate: SentRate = key(50.0, "its rate; default: 50 Hz", "50 Hz")
     as_: NodeName = Field(
         "/injected",
         alias="as",
@@ -51,7 +68,7 @@ class ShiftSpec(Spec):
     """An edge, and a time."""
 
     edge: FramePair = key(..., "the edge", "odom → base_link")
-    by: Duration = key(..., "by how much", "300 ms")
+    by: Shift = key(..., "by how much", "300 ms")
 
 
 class DropSpec(Spec):
@@ -79,7 +96,7 @@ class DynamicSpec(Spec):
     """A fixed edge that is sent on /tf."""
 
     edge: FramePair = key(..., "the fixed edge", "base_link → laser")
-    rate: Rate = key(10.0, "how often; default: 10 Hz", "10 Hz")
+    rate: SentRate = key(10.0, "how often; default: 10 Hz", "10 Hz")
 
 
 class JointFault(Spec):

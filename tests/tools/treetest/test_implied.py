@@ -1,6 +1,9 @@
 """``init --tests``: the cases that a robot file implies, and what they find."""
 
+import io
 import random
+import shlex
+import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from copy import deepcopy
@@ -172,6 +175,22 @@ def test_wrong_arguments_leave_no_file(arguments: tuple[str, ...], cart: Path) -
     assert done.returncode in {1, 2}
     assert done.stderr
     assert {file: file.stat().st_mtime_ns for file in cart.iterdir()} == before
+
+
+def test_a_robot_on_stdin_has_no_name_for_its_test_file(
+    cart: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(CART.encode())))
+    before = set(cart.iterdir())
+    assert tfcompose_in(cart, "init", "--tests", "-").returncode == 2
+    assert set(cart.iterdir()) == before
+
+
+def test_the_printed_command_runs_the_new_file(tmp_path: Path) -> None:
+    (tmp_path / "my cart.yaml").write_text(CART, "utf-8")
+    done = tfcompose("init", "--tests", tmp_path / "my cart.yaml")
+    (line,) = [line for line in done.stdout.splitlines() if "tfcompose test" in line]
+    assert shlex.split(line, comments=True)[2:] == [str(tmp_path / "my cart.test.yaml")]
 
 
 def test_each_dynamic_edge_has_a_case_with_a_second_publisher(

@@ -1,6 +1,7 @@
 """``tfcompose test`` on recordings that the library rosbags writes."""
 
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterable
 from math import nan
@@ -15,6 +16,7 @@ from rosbags.rosbag2 import Reader
 from tests.support.bags import UP, Sent, drive, tfcompose_without_ros, write_bag
 from tests.support.cli import tfcompose_in
 from tfcompose.tf.bags import Recording
+from tfcompose.tools.treetest.running import name_of_folder
 
 ROBOT = """\
 tfcompose: 1
@@ -282,7 +284,8 @@ def test_a_folder_without_test_files_and_a_k_without_cases_exit_with_2(
 ) -> None:
     assert tfcompose_in(tmp_path, "test").returncode == 2
     assert judge("findings: []", DRIVE, "-k", "park").returncode == 2
-    assert tfcompose_in(tmp_path, "test", "-k", "DRIV").returncode == 0
+    done = tfcompose_in(tmp_path, "test", "-k", "DRIV", "cart.test.yaml", "./cart.test.yaml", ".")
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "1 case, 0 failed")
     assert tfcompose_in(tmp_path, "test", "none.test.yaml").returncode == 2
     done = tfcompose_in(tmp_path, "test", "-j", "0")
     assert (done.returncode, done.stderr.count("Traceback")) == (2, 0)
@@ -334,6 +337,15 @@ def test_a_failed_case_leaves_a_bag_and_a_picture_of_its_tree(
         QosDurability.VOLATILE,
         QosDurability.TRANSIENT_LOCAL,
     ]
+
+
+def test_the_folder_of_a_case_is_of_this_case_alone() -> None:
+    cases = [("a.test.yaml", "a b"), ("a.test.yaml", "a-b"), ("b/a.test.yaml", "a b")]
+    cases += [("a.test.yaml", "\U00020000" * 260), ("a.test.yaml", "\U00020000" * 261)]
+    names = {name_of_folder(file, name) for file, name in cases}
+    assert len(names) == len(cases)
+    assert "a_test_a_b" not in names
+    assert max(len(os.fsencode(name)) for name in names) < 255
 
 
 def test_cases_in_parallel_are_printed_in_order(judge: Judge, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ opened: then no case runs.
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -97,7 +98,9 @@ def _cases(arguments: Namespace) -> list[Case]:
     from tfcompose.tools.treetest.cases import CaseLoader, files_in
 
     names = arguments.files or ["."]
-    files = list(dict.fromkeys(file for name in names for file in files_in(name)))
+    files = list(
+        dict.fromkeys(os.path.normpath(file) for name in names for file in files_in(name))
+    )
     if not files:
         fail(f"no file below {' or '.join(names)} ends in .test.yaml", UNREADABLE)
     loader = CaseLoader(trust=arguments.trust)

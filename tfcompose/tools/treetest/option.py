@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,8 @@ def run(command: str, arguments: Namespace) -> int | None:
         if arguments.bag or arguments.profiles:
             fail("--bag and --profile go with --tests FILE", UNREADABLE)
         return None
+    if arguments.tests == "-" and not arguments.output:
+        fail("--tests - has no name for the test file: -o FILE names it", UNREADABLE)
     if arguments.name or arguments.schema or arguments.list:
         fail("--tests writes no robot file: leave out --name, --schema and --list", UNREADABLE)
     from tfcompose.cli.compiling import compile_or_exit
@@ -70,7 +73,7 @@ def run(command: str, arguments: Namespace) -> int | None:
     except OSError as error:
         fail(f"{output} cannot be written: {error.strerror}", UNREADABLE)
     print(f"wrote {output}")
-    print_next({f"tfcompose test {output}": "run the cases"})
+    print_next({shlex.join(["tfcompose", "test", str(output)]): "run the cases"})
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shutil
@@ -36,6 +37,8 @@ _END_S = 60.0
 _REACHING_OUT = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOCALHOST_ONLY")
 #: Maximum number of printed lines of a process that failed.
 _LINES = 10
+#: Maximum number of characters of a case in the name of its folder; each may have four bytes.
+_MOST_CHARS = 50
 
 
 def run_case(case: Case, stop: Stop, keep: Path | None = None) -> CaseResult:
@@ -60,13 +63,20 @@ def run_case(case: Case, stop: Stop, keep: Path | None = None) -> CaseResult:
     return CaseResult(case, tuple(findings), folder if is_kept else None)
 
 
+def name_of_folder(file: str, name: str) -> str:
+    """Return the name of the folder that a failed case leaves: short, and of this case alone."""
+    words = re.sub(r"\W+", "_", f"{Path(file).name.removesuffix('.yaml')} {name}").strip("_")
+    digest = hashlib.sha256(f"{file}\n{name}".encode("utf-8", "surrogateescape")).hexdigest()
+    return f"{words[:_MOST_CHARS]}_{digest[:8]}"
+
+
 @contextmanager
 def _folder_of(case: Case, keep: Path | None) -> Iterator[Path]:
     """Give a new folder for a case's files, and remove it if the block fails."""
     if keep is None:
         folder = Path(tempfile.mkdtemp(prefix="tfcompose-test-"))
     else:
-        folder = keep / re.sub(r"\W+", "_", f"{case.file} {case.spec.name}").strip("_")
+        folder = keep / name_of_folder(case.file, case.spec.name)
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(mode=0o700, parents=True)
     try:

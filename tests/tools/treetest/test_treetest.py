@@ -117,6 +117,7 @@ def test_a_met_expectation_passes(expect: str, judge: Judge) -> None:
     [
         ("complete: 100 ms", [LASER, *later(drive(), 0.2)], "6:17", ["0.204 s"]),
         ("complete: 100 ms", drive(), "6:17", ["base_link → laser"]),
+        ("complete: 1 s", [LASER, *REJECTED], "6:17", ["tf2 rejects"]),
         (RATE, thinned(DRIVE), "6:40", ["25 Hz"]),
         (RATE, gap(DRIVE, 1.0, 2.5), "6:40", ["2.504 s"]),
         (RATE, [LASER], "6:15", ["odom → base_link"]),

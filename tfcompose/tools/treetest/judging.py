@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.signals import Stop
     from tfcompose.model.plan import PlanEdge
-    from tfcompose.tf.live.edges import EdgeState
+    from tfcompose.tf.live.edges import EdgeState, EdgeStream
     from tfcompose.tools.treetest.case import Case
     from tfcompose.tools.treetest.spec import EdgeExpectation, FindingExpectation
 
@@ -262,7 +262,13 @@ class CaseJudge:
         span = self.case.value_span("expect", "complete")
         if missing:
             message = f"expected all edges within {within_s:g} s; {list_names(missing)} never came"
-            yield finding("TF931", message, span)
+            rejected = [
+                edge.name
+                for edge in self.case.plan.edges
+                if edge.name in missing and any(self._streams_of(edge))
+            ]
+            notes = [Note(f"tf2 rejects every transform of {name}") for name in rejected]
+            yield finding("TF931", message, span, notes=notes)
         if late:
             last = max(late, key=late.__getitem__)
             message = (
@@ -272,14 +278,15 @@ class CaseJudge:
             yield finding("TF931", message, span, notes=map(Note, earlier))
 
     def _first_s(self, edge: PlanEdge) -> float | None:
-        """Return when an edge first arrived; None: never."""
-        streams = self.trees[self._topics_of[edge.child]].streams
-        first_ns = [
-            stream.first_ns
-            for stream in streams
-            if stream.child == edge.child and edge.may_hang_on(stream.parent)
-        ]
+        """Return when an edge of which tf2 accepts a transform first arrived; None: never."""
+        first_ns = [stream.first_ns for stream in self._streams_of(edge) if stream.is_taken]
         return self.timeline.elapsed_s(min(first_ns)) if first_ns else None
+
+    def _streams_of(self, edge: PlanEdge) -> Iterator[EdgeStream]:
+        """Yield what arrived of a planned edge."""
+        for stream in self.trees[self._topics_of[edge.child]].streams:
+            if stream.child == edge.child and edge.may_hang_on(stream.parent):
+                yield stream
 
     def _judge_declaration(self, pair: str, expected: EdgeExpectation) -> Iterator[Finding]:
         """Judge the rate and the joint of an edge by the robot file."""

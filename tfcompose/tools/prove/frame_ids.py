@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.findings import did_you_mean
 from tfcompose.foundation.geometry import OPTICAL_XYZW, angle_between, multiply
 from tfcompose.model.robot import is_optical
-from tfcompose.tools.prove.messages import IMAGES
+from tfcompose.tools.prove.messages import CLOUDS, IMAGES
 from tfcompose.tools.prove.verdict import CheckResult
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from tfcompose.foundation.geometry import Pose
     from tfcompose.model.robot import Robot
     from tfcompose.tools.prove.messages import MeasuredTopic
@@ -30,6 +32,8 @@ def judge_frame(
     """
     finals = {robot.final(name): name for name in robot.frames}
     frame = topic.frame
+    if len(topic.frames) > 1:
+        return _judge_frames(topic, declared, finals)
     if frame not in finals:
         text = f"has frame_id {frame or '(empty)'}, which the file does not declare"
         expected = declared or "a declared frame"
@@ -50,6 +54,20 @@ def judge_frame(
         advice = f"let the driver use {expected} (REP-103)"
         return CheckResult(CHECK, "differs", text, "TF652", advice)
     return CheckResult(CHECK, "agrees", frame)
+
+
+def _judge_frames(topic: MeasuredTopic, declared: str, finals: Mapping[str, str]) -> CheckResult:
+    """Return the result for a topic on which messages of different frames come.
+
+    Clouds of different sensors may share a topic.
+    """
+    order = sorted(topic.frames, key=lambda name: (-topic.frames[name], name))
+    frames = [frame or "(empty)" for frame in order]
+    named = f"has frame_id {' and '.join(frames)}"
+    if topic.type in CLOUDS and not declared and finals.keys() >= {*frames}:
+        return CheckResult(CHECK, "cannot tell", f"{topic.name} {named}")
+    advice = "let each driver use its own topic, and the frame that the file declares"
+    return CheckResult(CHECK, "differs", f"{named} on {topic.name}", "TF652", advice)
 
 
 def _is_optical(robot: Robot, frame: str, base_from_frames: dict[str, Pose]) -> bool:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tfcompose.tools.prove.motion import STEADY, Estimate
 from tfcompose.tools.prove.rotations import UP, angle_of, frame_of, level, quat_of, snap
 from tfcompose.tools.prove.verdict import CheckResult
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tfcompose.foundation.geometry import Quaternion
-    from tfcompose.tools.prove.motion import Estimate, Motion
+    from tfcompose.tools.prove.motion import Motion
 
     Array = NDArray[np.float64]
 
@@ -68,8 +69,8 @@ class ImuCheck:
 
     def _judge_gravity(self) -> CheckResult:
         up, check = self.motion.up, "gravity"
-        if up is None:
-            return CheckResult(check, "cannot tell", "too few messages came")
+        if isinstance(up, str):
+            return CheckResult(check, "cannot tell", up)
         if not _within(up.length / G, _G_RANGE):
             return self._judge_force(up)
         tilt = self._tilt_rad(up)
@@ -94,7 +95,7 @@ class ImuCheck:
             return CheckResult(check, "differs", text, "TF650", why_not, values=values)
         forward = self.motion.forward
         advice = ""
-        if forward is None or forward.error_rad > _VAGUE_RAD:
+        if isinstance(forward, str) or forward.error_rad > _VAGUE_RAD:
             advice = "; its heading is not measured: speed up and brake while prove listens"
         return CheckResult(
             check,
@@ -123,10 +124,8 @@ class ImuCheck:
         Yield nothing if gravity already shows the same other mount.
         """
         axis, check = self.motion.yaw_axis, "yaw rate"
-        if axis is None:
-            degrees = math.degrees(self.motion.yaw_rate_std)
-            reason = f"the base hardly rotates by odometry ({degrees:.1f} deg/s): drive curves"
-            yield CheckResult(check, "cannot tell", reason)
+        if isinstance(axis, str):
+            yield CheckResult(check, "cannot tell", axis)
             return
         if self._is_vague(axis):
             degrees = math.degrees(axis.error_rad)
@@ -150,7 +149,7 @@ class ImuCheck:
             yield CheckResult(check, "agrees", measured, values=values)
             return
         up = self.motion.up
-        if up is None or not _within(up.length / G, _G_RANGE):
+        if isinstance(up, str) or not _within(up.length / G, _G_RANGE):
             text = f"measures the base's yaw {_axis_name(self.base_from_frame, axis)}"
             advice = "gravity is not measured, so the mount is not known"
             yield CheckResult(check, "differs", text, "TF651", advice, values=values)
@@ -175,10 +174,13 @@ class ImuCheck:
         Yield nothing if gravity already shows another mount.
         """
         forward, up = self.motion.forward, self.motion.up
-        if up is None or self._is_beyond(self._tilt_rad(up), up):
+        if isinstance(up, str):
+            yield CheckResult("heading", "cannot tell", up)
             return
-        if forward is None or forward.error_rad > _VAGUE_RAD:
-            reason = "the base hardly accelerates by odometry: speed up and brake"
+        if self._is_beyond(self._tilt_rad(up), up):
+            return
+        if isinstance(forward, str) or forward.error_rad > _VAGUE_RAD:
+            reason = forward if isinstance(forward, str) else STEADY
             yield CheckResult("heading", "cannot tell", reason)
             return
         if not _within(forward.length, (0.5, 2.0)):
@@ -204,15 +206,15 @@ class ImuCheck:
         """Return the fitting rotation of the frame in the base, or why there is none."""
         declared, forward = self.base_from_frame, self.motion.forward
         tilt, axis = self._tilt_rad(up), self.motion.yaw_axis
-        if axis is not None and angle_of(axis.direction, up.direction) > _SAME_RAD:
+        if isinstance(axis, Estimate) and angle_of(axis.direction, up.direction) > _SAME_RAD:
             return None, "gravity and yaw rate do not fit one mount: check the driver's axes"
-        if tilt > _UPSIDE_DOWN_RAD and axis is None:
+        if tilt > _UPSIDE_DOWN_RAD and isinstance(axis, str):
             return None, "it is upside down, or the driver has the wrong sign: drive curves"
         if tilt > _UPSIDE_DOWN_RAD:
             # A half turn about any horizontal axis fits; x is the usual axis.
             declared = np.diag([1.0, -1.0, -1.0]) @ declared
         leveled = level(declared, up.direction)
-        if forward is not None and forward.error_rad <= _VAGUE_RAD:
+        if isinstance(forward, Estimate) and forward.error_rad <= _VAGUE_RAD:
             x, y, _ = leveled @ forward.direction
             if abs(math.atan2(y, x)) > _YAW_RAD + _SIGMAS * forward.error_rad:
                 leveled = frame_of(forward.direction, up.direction)
@@ -229,7 +231,7 @@ class ImuCheck:
 
     def _signs_differ(self) -> bool:
         up, axis = self.motion.up, self.motion.yaw_axis
-        if up is None or axis is None:
+        if isinstance(up, str) or isinstance(axis, str):
             return False
         return angle_of(up.direction, axis.direction) >= _OPPOSITE_RAD
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,9 @@ class MeasuredTopic:
     type: str
     #: The number of messages by the frame in their headers.
     frames: dict[str, int] = field(default_factory=dict)
+    #: The same for messages that cannot be read as this type. The frame is empty if the header
+    #: cannot be read either.
+    unreadable: dict[str, int] = field(default_factory=dict)
     #: A row of numbers for each message of an IMU or of odometry. ``imu_of`` and ``odometry_of``
     #: read these rows.
     rows: list[tuple[float, ...]] = field(default_factory=list)
@@ -43,12 +47,16 @@ class MeasuredTopic:
     @property
     def frame(self) -> str:
         """The frame of most messages; empty if there are none."""
-        return max(self.frames, key=lambda name: self.frames[name], default="")
+        frames = self.frames or self.unreadable
+        return max(frames, key=lambda name: frames[name], default="")
 
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """The measurements of an IMU over time, in the axes of the IMU."""
+    """The measurements of an IMU over time, in the axes of the IMU.
+
+    A row of forces or rates is NaN if the IMU reports none.
+    """
 
     #: In seconds, shape (n,), ascending.
     stamps_s: NDArray[np.float64]
@@ -85,28 +93,35 @@ def decode(topic: MeasuredTopic, stamp_ns: int, data: bytes) -> None:
         return
     message: Any = _STORE.deserialize_cdr(data, topic.type)
     if topic.type == IMU:
-        force, rate = message.linear_acceleration, message.angular_velocity
-        topic.rows.append((stamp_s, force.x, force.y, force.z, rate.x, rate.y, rate.z))
+        force = _reported(message.linear_acceleration, message.linear_acceleration_covariance)
+        rate = _reported(message.angular_velocity, message.angular_velocity_covariance)
+        topic.rows.append((stamp_s, *force, *rate))
         return
     linear, angular = message.twist.twist.linear, message.twist.twist.angular
     topic.child_frame = message.child_frame_id
     topic.rows.append((stamp_s, linear.x, linear.y, angular.z))
 
 
+def _reported(vector: Any, covariance: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Return a vector of an IMU; NaN if the covariance marks it as absent (sensor_msgs/Imu)."""
+    is_absent = float(covariance[0]) == -1
+    return (math.nan, math.nan, math.nan) if is_absent else (vector.x, vector.y, vector.z)
+
+
 def imu_of(topic: MeasuredTopic) -> Imu:
-    """Return the finite measurements of an IMU's topic."""
-    rows = _array(topic, 7)
+    """Return the measurements of an IMU's topic."""
+    rows = _in_order(np.array(topic.rows, dtype=np.float64).reshape(-1, 7))
     return Imu(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
 
 def odometry_of(topic: MeasuredTopic) -> Odometry:
     """Return the finite measurements of a topic with odometry."""
-    rows = _array(topic, 4)
+    rows = np.array(topic.rows, dtype=np.float64).reshape(-1, 4)
+    rows = _in_order(rows[np.isfinite(rows).all(axis=1)])
     return Odometry(rows[:, 0], rows[:, 1:3], rows[:, 3])
 
 
-def _array(topic: MeasuredTopic, columns: int) -> NDArray[np.float64]:
-    rows = np.array(topic.rows, dtype=np.float64).reshape(-1, columns)
-    rows = rows[np.isfinite(rows).all(axis=1)]
+def _in_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rows by stamp, which is the first column; of equal stamps only the first row."""
     _, first = np.unique(rows[:, 0], return_index=True)
     return rows[first]

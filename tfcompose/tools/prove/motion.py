@@ -8,6 +8,7 @@ in time does not make them too small.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,9 @@ STRETCHES = 8
 #: m/s².
 LEAST_YAW_RATE = 0.08
 LEAST_ACCELERATION = 0.08
+#: Why an estimate is unknown.
+STEADY = "the base hardly accelerates by odometry: speed up and brake"
+_APART = "too few measurements came at the times of odometry"
 #: Accelerations are computed from speeds that are averaged over this many intervals.
 _SMOOTHED = 5
 
@@ -59,51 +63,97 @@ class Estimate:
 class Motion:
     """The relation between an IMU's measurements and the motion of the base.
 
-    An estimate is None if the motion is too small for it.
+    Instead of an unknown estimate, there is the reason.
     """
 
     #: The specific force at rest, in m/s². It points up.
-    up: Estimate | None
+    up: Estimate | str
     #: The specific force for a forward acceleration of 1 m/s². It points forward.
-    forward: Estimate | None
+    forward: Estimate | str
     #: The measured rate for a yaw rate of 1 rad/s. It points along the yaw axis.
-    yaw_axis: Estimate | None
-    #: The standard deviation of the base's yaw rate, in rad/s.
-    yaw_rate_std: float = 0.0
+    yaw_axis: Estimate | str
 
 
 def motion_of(imu: Imu, odometry: Odometry | None, base_xyz: Array) -> Motion:
     """Return the estimates for an IMU at ``base_xyz``, its position in the base in metres."""
-    if len(imu.stamps_s) < FEWEST:
-        return Motion(None, None, None)
-    if odometry is None or len(odometry.stamps_s) < FEWEST:
-        return Motion(_mean_force(imu), None, None)
-    begin = max(imu.stamps_s[0], odometry.stamps_s[0])
-    end = min(imu.stamps_s[-1], odometry.stamps_s[-1])
-    if end - begin < FEWEST * INTERVAL_S:
-        return Motion(_mean_force(imu), None, None)
-    edges = np.arange(begin, end, INTERVAL_S)
-    forces, rates = (means(imu.stamps_s, values, edges) for values in (imu.forces, imu.rates))
-    velocities = _smooth(means(odometry.stamps_s, odometry.velocities, edges))
-    yaw_rates = _smooth(means(odometry.stamps_s, odometry.yaw_rates[:, None], edges))[:, 0]
-    forces, rates = _smooth(forces), _smooth(rates)
+    return Motion(
+        *_force_estimates(imu, odometry, base_xyz),
+        yaw_axis=_yaw_axis(imu, odometry),
+    )
+
+
+def _force_estimates(
+    imu: Imu, odometry: Odometry | None, base_xyz: Array
+) -> tuple[Estimate | str, Estimate | str]:
+    """Return the specific force at rest, and for a forward acceleration."""
+    stamps, forces = _measured(imu.stamps_s, imu.forces)
+    if len(stamps) < FEWEST:
+        reason = _why_few(imu, len(stamps), "acceleration")
+        return reason, reason
+    at_rest = _regress(np.ones((len(forces), 1)), forces)[0]
+    edges = _edges(stamps, odometry)
+    if odometry is None or edges is None:
+        return at_rest, _APART
+    velocities, yaw_rates = _speeds(odometry, edges)
     accelerations = _accelerations(velocities, yaw_rates, base_xyz)
-    constant = np.ones(len(yaw_rates))
-    with_force = np.column_stack([constant, accelerations])
-    up, forward, left = _regress(with_force, forces)
-    _, yaw_axis = _regress(np.column_stack([constant, yaw_rates]), rates)
+    with_force = np.column_stack([np.ones(len(yaw_rates)), accelerations])
+    up, forward, left = _regress(with_force, _smooth(means(stamps, forces, edges)))
     stds = accelerations.std(axis=0)
-    yaw_rate_std = float(yaw_rates.std())
-    is_rotated = yaw_rate_std >= LEAST_YAW_RATE
-    is_moved = max(stds) >= LEAST_ACCELERATION
     if stds[1] > stds[0]:
         forward = Estimate(np.cross(left.vector, up.direction), left.error_rad)
-    return Motion(
-        up if is_moved or is_rotated else _mean_force(imu),
-        forward if is_moved else None,
-        yaw_axis if is_rotated else None,
-        yaw_rate_std,
-    )
+    if max(stds) >= LEAST_ACCELERATION:
+        return up, forward
+    is_rotated = yaw_rates.std() >= LEAST_YAW_RATE
+    return up if is_rotated else at_rest, STEADY
+
+
+def _yaw_axis(imu: Imu, odometry: Odometry | None) -> Estimate | str:
+    """Return the measured rate for a yaw rate of 1 rad/s."""
+    stamps, rates = _measured(imu.stamps_s, imu.rates)
+    if len(stamps) < FEWEST:
+        return _why_few(imu, len(stamps), "angular velocity")
+    edges = _edges(stamps, odometry)
+    if odometry is None or edges is None:
+        return _APART
+    _, yaw_rates = _speeds(odometry, edges)
+    std = float(yaw_rates.std())
+    if std < LEAST_YAW_RATE:
+        degrees = math.degrees(std)
+        return f"the base hardly rotates by odometry ({degrees:.1f} deg/s): drive curves"
+    inputs = np.column_stack([np.ones(len(yaw_rates)), yaw_rates])
+    return _regress(inputs, _smooth(means(stamps, rates, edges)))[1]
+
+
+def _measured(stamps_s: Array, values: Array) -> tuple[Array, Array]:
+    """Return the stamps with finite values, and these values."""
+    is_finite = np.isfinite(values).all(axis=1)
+    return stamps_s[is_finite], values[is_finite]
+
+
+def _why_few(imu: Imu, count: int, quantity: str) -> str:
+    """Return why there is no estimate from ``count`` measurements of a quantity."""
+    if len(imu.stamps_s) < FEWEST:
+        return "too few messages came"
+    few = f"only {count} times an" if count else "no"
+    return f"the driver reports {few} {quantity}"
+
+
+def _edges(stamps_s: Array, odometry: Odometry | None) -> Array | None:
+    """Return the edges of the intervals in which both measure, None if they are too few."""
+    if odometry is None or len(odometry.stamps_s) < FEWEST:
+        return None
+    begin = max(stamps_s[0], odometry.stamps_s[0])
+    end = min(stamps_s[-1], odometry.stamps_s[-1])
+    if end - begin < FEWEST * INTERVAL_S:
+        return None
+    return np.arange(begin, end, INTERVAL_S)
+
+
+def _speeds(odometry: Odometry, edges_s: Array) -> tuple[Array, Array]:
+    """Return the smooth mean velocities and yaw rates of the base between edges."""
+    velocities = means(odometry.stamps_s, odometry.velocities, edges_s)
+    yaw_rates = means(odometry.stamps_s, odometry.yaw_rates[:, None], edges_s)
+    return _smooth(velocities), _smooth(yaw_rates)[:, 0]
 
 
 def means(stamps_s: Array, values: Array, edges_s: Array) -> Array:
@@ -157,7 +207,3 @@ def _regress(inputs: Array, outputs: Array) -> list[Estimate]:
         Estimate(vector, float(np.sqrt(variance) / max(np.linalg.norm(vector), 1e-12)))
         for vector, variance in zip(vectors, variances, strict=True)
     ]
-
-
-def _mean_force(imu: Imu) -> Estimate:
-    return _regress(np.ones((len(imu.forces), 1)), imu.forces)[0]

@@ -15,6 +15,7 @@ from tfcompose.compiler.mounts.kinematics import poses_in_roots
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.findings import Note, finding
 from tfcompose.foundation.geometry import Pose, quat_from_rpy, rpy_from_quat
+from tfcompose.foundation.text import plural
 from tfcompose.model.robot import is_optical
 from tfcompose.tools.prove.frame_ids import judge_frame
 from tfcompose.tools.prove.imu import ImuCheck
@@ -63,18 +64,18 @@ class Proof:
         """Return the verdicts of all checks, by sensor and topic."""
         poses = self._base_from_frames()
         odometry = self._odometry()
+        only = {self._sensor_name(name) for name in self.only}
         verdicts = [
             verdict
             for topic in self.measurements.topics.values()
-            if topic.type != ODOMETRY and topic.frames
             for verdict in self._verdicts_on(topic, poses, odometry)
-            if not self.only or verdict.sensor in self.only
+            if not only or verdict.sensor in only
         ]
         received = {verdict.sensor for verdict in verdicts}
         verdicts += self._overlaps(verdicts, poses, odometry)
         verdicts += [
             SensorVerdict(name, "", CheckResult("data", "cannot tell", "no message came"))
-            for name in sorted(self.only or {sensor.name for sensor in self._measuring()})
+            for name in sorted(only or {sensor.name for sensor in self._measuring()})
             if name not in received
         ]
         return sorted(verdicts, key=lambda verdict: (verdict.sensor, verdict.topic))
@@ -90,8 +91,14 @@ class Proof:
         declared, sensor = self._declared(topic)
         frame = self._frame_of(topic)
         if sensor is None:
-            sensor = next((each for each in self.robot.sensors if frame in _frames(each)), None)
+            sensor = self._sensor_of(frame)
         name = sensor.name if sensor else frame or topic.name
+        if topic.unreadable:
+            messages = plural(sum(topic.unreadable.values()), "message")
+            reason = f"{messages} on {topic.name} cannot be read as {topic.type}"
+            yield SensorVerdict(name, topic.name, CheckResult("data", "cannot tell", reason))
+        if topic.type == ODOMETRY or not topic.frames:
+            return
         judgements = [judge_frame(self.robot, topic, declared, poses)]
         if topic.type == IMU and frame and judgements[0].answer == "agrees":
             judgements += self._judge_imu(topic, frame, poses, odometry)
@@ -99,6 +106,16 @@ class Proof:
             judgements += self._judge_ranges(topic, frame, poses, odometry)
         for judgement in judgements:
             yield self._verdict(name, topic, judgement, sensor, frame, poses)
+
+    def _sensor_of(self, frame: str) -> MountedSensor | None:
+        """Return the sensor that has a frame."""
+        return next((each for each in self.robot.sensors if frame in _frames(each)), None)
+
+    def _sensor_name(self, name: str) -> str:
+        """Return the sensor's name for that of its frame; other names stay as they are."""
+        sensor = self._sensor_of(name)
+        is_frame = all(each.name != name for each in self.robot.sensors)
+        return sensor.name if sensor and is_frame else name
 
     def _frame_of(self, topic: MeasuredTopic) -> str:
         """Return the declared frame of a topic's messages; empty if there is none."""
@@ -132,15 +149,15 @@ class Proof:
     def _odometry(self) -> Odometry | None:
         """Return the motion of the base.
 
-        If several topics contain odometry, use the topic with the most messages.
+        If several topics contain odometry, use the topic with the most measurements.
         """
-        topics = [
-            topic
+        measured = [
+            odometry_of(topic)
             for topic in self.measurements.topics.values()
-            if topic.type == ODOMETRY and topic.rows and self._is_of_base(topic)
+            if topic.type == ODOMETRY and self._is_of_base(topic)
         ]
-        best = max(topics, key=lambda topic: len(topic.rows), default=None)
-        return odometry_of(best) if best else None
+        best = max(measured, key=lambda each: len(each.stamps_s), default=None)
+        return best if best and len(best.stamps_s) else None
 
     def _is_of_base(self, topic: MeasuredTopic) -> bool:
         """Return whether odometry moves the base, or a frame that is fixed level to the base."""
@@ -183,7 +200,7 @@ class Proof:
         limit = self._limit("TF650")
         for judgement in ImuCheck(motion, matrix_of(pose.quat_xyzw), limit).judge():
             if odometry is None and judgement.check in {"yaw rate", "heading"}:
-                reason = f"no odometry of {self.robot.base} came"
+                reason = f"no usable odometry of {self.robot.base} came"
                 yield replace(judgement, text=reason)
                 continue
             yield judgement

@@ -72,7 +72,7 @@ class RangingCheck:
 
     def __post_init__(self) -> None:
         self.floor = self._find_floor()
-        self.heading = "no odometry of the base came"
+        self.heading = "no usable odometry of the base came"
         if self.track is not None:
             self._travel = self._travel_of(self.track)
             self.heading = self._travel.heading()

@@ -17,8 +17,6 @@ class Measurements:
 
     def __init__(self) -> None:
         self.topics: dict[str, MeasuredTopic] = {}
-        #: The number of messages that do not have their topic's type, by topic.
-        self.malformed: dict[str, int] = {}
 
     def take(self, name: str, type_: str, data: bytes) -> None:
         """Add a message."""
@@ -29,7 +27,8 @@ class Measurements:
                 raise ValueError(type_)  # noqa: TRY301 (as if it could not be decoded)
             decode(topic, header[1], data)
         except Exception:  # noqa: BLE001 (rosbags raises anything for bytes of another type)
-            self.malformed[name] = self.malformed.get(name, 0) + 1
+            frame = header[0] if header else ""
+            topic.unreadable[frame] = topic.unreadable.get(frame, 0) + 1
             return
         topic.frames[header[0]] = topic.frames.get(header[0], 0) + 1
 

@@ -310,6 +310,28 @@ def test_fix_writes_the_overlay_of_one_robot(option: str, record: Callable[..., 
     prove(folder, "--robot", "ant", code=1)
 
 
+def test_fix_joins_a_mounts_poses_and_leaves_what_a_setting_places(tmp_path: Path) -> None:
+    x, y, z = MOUNTS["front"].xyz
+    mounts = MOUNTS | {"front": Mount((x, y, z - 0.05), (0.0, 5.0, 0.0))}
+    robot = robot_file(mounts).replace("frames:", "overlays: {folder: units}\nframes:")
+    (tmp_path / "robot.yaml").write_text(robot, "utf-8")
+    options = ("imu", "front", "--set", "sensors.imu.rpy=[180 deg, 0, 0]")
+    checks, errors = prove(tmp_path, *options, bag=RECORDING, code=1)
+    assert "--set" in errors
+    assert "--as NAME" not in errors, "the overlay would be refused"
+    assert {checks["front", check]["code"] for check in ("floor", "height")} == {"TF650", "TF653"}
+    checks, errors = prove(tmp_path, *options, "--fix", "--as", "ant", bag=RECORDING, code=1)
+    differing = {key for key, each in checks.items() if each["answer"] == "differs"}
+    assert differing == {("imu", "gravity")}
+    assert "TF662" in errors
+    assert "units/ant.yaml" in errors
+    text = (tmp_path / "units/ant.yaml").read_text("utf-8")
+    assert text.count("tool: prove") == 1
+    undone = tfcompose_in(tmp_path, "calibrate", "robot.yaml", "front", "--robot", "ant", "--undo")
+    assert undone.returncode == 0, undone.stderr
+    assert "front" not in (tmp_path / "units/ant.yaml").read_text("utf-8")
+
+
 def test_a_robot_without_overlays_and_two_names_are_refused(record: Callable[..., Path]) -> None:
     folder = record(factors=FLIPPED)
     assert "TF" in prove_text(folder, "--fix", "--as", "ant", code=1)

@@ -537,6 +537,11 @@ def _with_include(finding: Finding, span: Span) -> Finding:
 SETTING = "--set "
 
 
+def setting_name(setting: str) -> str:
+    """Return the file name in the spans of a ``--set`` setting."""
+    return f"{SETTING}{setting}"
+
+
 def set_value(setting: str) -> Source:
     """Return the overlay for ``PATH=VALUE``.
 
@@ -546,7 +551,7 @@ def set_value(setting: str) -> Source:
         RejectedError: if there is no ``=``, the value is not YAML, or the key is read before
             overlays are merged.
     """
-    span = Span(f"{SETTING}{setting}")
+    span = Span(setting_name(setting))
     path_text, sign, value_text = setting.partition("=")
     path: Path = tuple(path_text.strip().split("."))
     if not sign or not all(path):

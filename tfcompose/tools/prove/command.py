@@ -76,7 +76,8 @@ def run(arguments: Namespace) -> int:
     _refuse_unknown_sensors(arguments, robot)
     measurements = _measure(arguments, robot.ros)
     if arguments.fix and (arguments.overlay or arguments.overlay_robot):
-        return _report(arguments, *_fix_overlay(arguments, measurements, day))
+        verdicts, fixed, refused = _fix_overlay(arguments, measurements, day)
+        return _report(arguments, verdicts, fixed, refused)
     prove = _prover(arguments, measurements, day)
     verdicts = prove(read_text)
     fixed = _fix(arguments, prove) if arguments.fix else []
@@ -147,7 +148,7 @@ def _prover(
         if compiled.robot is None or compiled.errors:
             reject(compiled.findings)
         texts = {arguments.file: read(arguments.file)}
-        return _verdicts(compiled, texts, measurements, arguments.sensors)
+        return _verdicts(compiled, texts, measurements, arguments)
 
     return prove
 
@@ -156,13 +157,14 @@ def _verdicts(
     compiled: Compiled,
     texts: Mapping[str, str] | None,
     measurements: Measurements,
-    sensors: Sequence[str],
+    arguments: Namespace,
 ) -> list[SensorVerdict]:
     """Return the verdicts on a robot without errors; those that comments allow are no findings.
 
     ``texts`` are the files to edit; None: findings have no edits.
     """
     from tfcompose.compiler.check import apply
+    from tfcompose.spec.language.overlay import setting_name
     from tfcompose.tools.prove.proof import Proof
 
     assert compiled.robot is not None  # noqa: S101 (compiled without errors)
@@ -171,8 +173,9 @@ def _verdicts(
         compiled.sources[0],
         texts or {},
         measurements,
-        frozenset(sensors),
+        frozenset(arguments.sensors),
         has_edits=texts is not None,
+        overlays=frozenset([*arguments.overlays, *map(setting_name, arguments.settings)]),
     )
     verdicts = proof.verdicts()
     kept, _ = apply(findings_of(verdicts), compiled.allows)
@@ -207,11 +210,12 @@ def _fix(
 
 def _fix_overlay(
     arguments: Namespace, measurements: Measurements, day: date | None
-) -> tuple[list[SensorVerdict], list[Finding]]:
+) -> tuple[list[SensorVerdict], list[Finding], list[Finding]]:
     """Write the poses that fit into the overlay of one robot.
 
     As with a robot file, a pose is kept only if its check then agrees and no other differs.
-    Returns the verdicts with the overlay, and the findings that it removes.
+    Returns the verdicts with the overlay, the findings that it removes, and why it cannot set
+    other poses.
 
     Raises:
         SystemExit: after reporting that the overlay cannot be read or written.
@@ -221,11 +225,12 @@ def _fix_overlay(
 
     def prove(overlay: RobotOverlay) -> list[SensorVerdict]:
         compiled = overlay.compile(overlay.text)
-        return _verdicts(compiled, None, measurements, arguments.sensors)
+        return _verdicts(compiled, None, measurements, arguments)
 
     name = arguments.overlay or arguments.overlay_robot
     origin = arguments.bag or "the running robot"
-    fixed, tried = [], set()
+    fixed, tried, refused = [], set(), []
+    placed: set[str] = set()
     try:
         overlay = edited = RobotOverlay.open(arguments.file, arguments, name, day)
         verdicts = prove(edited)
@@ -233,10 +238,20 @@ def _fix_overlay(
             fit, problem = fitting[0].fit, fitting[0].finding
             assert fit is not None  # noqa: S101 (as above)
             tried.add(fit)
-            changed = replace(edited, text=edited.with_pose(*fit, "prove", origin, joins=False))
+            try:
+                # The poses of a mount are one entry of its history, so that --undo restores the
+                # pose before this run.
+                text = edited.with_pose(*fit, "prove", origin, joins=fit[0] in placed)
+            except RejectedError as error:
+                refused += [entry for entry in error.findings if entry not in refused]
+                continue
+            if text is None:
+                continue
+            changed = replace(edited, text=text)
             after = prove(changed)
             if problem and len(findings_of(after)) < len(findings_of(verdicts)):
                 fixed.append(problem)
+                placed.add(fit[0])
                 edited, verdicts = changed, after
         if edited.text is not None and fixed:
             overlay.write(edited.text)
@@ -245,7 +260,7 @@ def _fix_overlay(
         reject(error.findings)
     except OSError as error:
         fail(f"{error.filename or arguments.file} cannot be written: {error.strerror}", UNREADABLE)
-    return verdicts, fixed
+    return verdicts, fixed, refused
 
 
 def findings_of(verdicts: Sequence[SensorVerdict]) -> list[Finding]:
@@ -254,7 +269,12 @@ def findings_of(verdicts: Sequence[SensorVerdict]) -> list[Finding]:
     return sorted(findings, key=lambda finding: finding.sort_key)
 
 
-def _report(arguments: Namespace, verdicts: list[SensorVerdict], fixed: list[Finding]) -> int:
+def _report(
+    arguments: Namespace,
+    verdicts: list[SensorVerdict],
+    fixed: list[Finding],
+    refused: Sequence[Finding] = (),
+) -> int:
     findings = findings_of(verdicts)
     if arguments.format == "json":
         entries = [verdict.as_json() for verdict in verdicts]
@@ -267,7 +287,7 @@ def _report(arguments: Namespace, verdicts: list[SensorVerdict], fixed: list[Fin
                 print(f"{verdict.sensor}: {judgement.check} {judgement.answer}: {judgement.text}")
         for finding in fixed:
             print(f"fixed: {finding.message}")
-    print_findings(findings, sys.stderr)
+    print_findings([*findings, *refused], sys.stderr)
     if not verdicts:
         fail(f"no message came in a frame of {arguments.file}, which has no sensors", UNREADABLE)
     if findings:

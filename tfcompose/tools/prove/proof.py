@@ -59,26 +59,32 @@ class Proof:
     only: frozenset[str] = frozenset()
     #: Whether findings have edits of the robot file.
     has_edits: bool = True
+    #: The overlays and settings that take precedence over the overlay of one robot, by the file
+    #: names in spans.
+    overlays: frozenset[str] = frozenset()
 
     def verdicts(self) -> list[SensorVerdict]:
         """Return the verdicts of all checks, by sensor and topic."""
         poses = self._base_from_frames()
         odometry = self._odometry()
-        only = {self._sensor_name(name) for name in self.only}
         verdicts = [
             verdict
             for topic in self.measurements.topics.values()
             for verdict in self._verdicts_on(topic, poses, odometry)
-            if not only or verdict.sensor in only
         ]
         received = {verdict.sensor for verdict in verdicts}
         verdicts += self._overlaps(verdicts, poses, odometry)
         verdicts += [
             SensorVerdict(name, "", CheckResult("data", "cannot tell", "no message came"))
-            for name in sorted(only or {sensor.name for sensor in self._measuring()})
+            for name in sorted(self._only or {sensor.name for sensor in self._measuring()})
             if name not in received
         ]
         return sorted(verdicts, key=lambda verdict: (verdict.sensor, verdict.topic))
+
+    @property
+    def _only(self) -> set[str]:
+        """The sensors, and frames of none, to check; empty for all."""
+        return {self._sensor_name(name) for name in self.only}
 
     def _measuring(self) -> Iterator[MountedSensor]:
         """Yield the sensors that have messages to check."""
@@ -93,6 +99,8 @@ class Proof:
         if sensor is None:
             sensor = self._sensor_of(frame)
         name = sensor.name if sensor else frame or topic.name
+        if self.only and name not in self._only:
+            return
         if topic.unreadable:
             messages = plural(sum(topic.unreadable.values()), "message")
             reason = f"{messages} on {topic.name} cannot be read as {topic.type}"
@@ -300,7 +308,7 @@ class Proof:
         advice += f" of {mount} in {edge.parent} would fit{judgement.help}"
         edits, reason = self._edits(mount, new) if self.has_edits else ((), "")
         if reason:
-            notes.append(Note(f"--fix leaves it: {reason}; --fix --as NAME writes an overlay"))
+            notes.append(Note(f"--fix leaves it: {reason}"))
         problem = finding(judgement.code, message, span, help=advice, notes=notes, edits=edits)
         return replace(verdict, finding=problem, fit=(mount, new))
 
@@ -328,6 +336,10 @@ class Proof:
             return (), str(error)
         if isinstance(change, MountEdits):
             return change.edits, ""
+        measured = self.source.exact_span((*change.entry, "calibration"))
+        spans = (change.span, measured) if measured else (change.span,)
+        if change.entry and not any(span.file in self.overlays for span in spans):
+            return (), f"{change.reason}; --fix --as NAME writes an overlay"
         return (), change.reason
 
 

@@ -94,6 +94,19 @@ def test_many_nudges_are_one_entry_and_undo_restores_the_first_pose() -> None:
     assert restored == before
 
 
+@pytest.mark.parametrize("null", ["", " ~", " null"])
+def test_a_key_that_removes_a_value_is_restored(null: str) -> None:
+    Path("units").mkdir()
+    before = f"frames:\n  mast:\n    look:{null}\n    calibration: null\n    rpy: [0, 0, 1]\n"
+    Path(OVERLAY).write_text(before, "utf-8")
+    assert opened().save("mast", Pose((0, 0, 0.4)), "nudge", joins=True)
+    assert pose_of("mast")[0] == [0, 0, 0.4]
+    overlay = opened()
+    _, restored = overlay.without_newest(fixed_mount(overlay.compile(overlay.text), "mast"))
+    keys = read_overlay(restored, OVERLAY).pose_of(("frames", "mast"), OVERLAY)
+    assert keys == {"look": None, "calibration": None, "rpy": [0, 0, 1]}
+
+
 def test_an_equal_pose_leaves_the_overlay_alone() -> None:
     pose = Pose((0, 0, 0.3), quat_from_rpy(0, 0, 1.5707963267948966))
     assert not opened().save("mast", pose, "nudge", joins=True)

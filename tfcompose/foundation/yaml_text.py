@@ -90,6 +90,8 @@ def flow(value: Any) -> str:
         return f"{{{', '.join(f'{text(key)}: {flow(item)}' for key, item in value.items())}}}"
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(flow, value))}]"
+    if value is None:
+        return "null"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (int, float)):

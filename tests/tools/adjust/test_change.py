@@ -39,12 +39,22 @@ def test_a_sign_adds_and_an_equals_sign_replaces(axis: str, text: str, change: P
     ("axis", "text"),
     [
         *[("x", text) for text in ("2mm", "", "+2", "+2deg", "+2 furlong", "++2mm", "+nanm", "=")],
-        *[("yaw", text) for text in ("+1mm", "=1", "0.5deg")],
+        *[("x", text) for text in ("+1e400 m", "+1e308m", "=-1e31 m", "+1e306 km")],
+        *[("yaw", text) for text in ("+1mm", "=1", "0.5deg", "+1e31 rad")],
     ],
 )
 def test_a_text_that_may_mean_something_else_is_refused(axis: str, text: str) -> None:
-    with pytest.raises(ChangeError, match=f"--{axis} "):
+    with pytest.raises(ChangeError, match=f"--{axis} ") as error:
         change_of(axis, text)
+    assert not str(error.value).endswith("; ")
+
+
+@pytest.mark.parametrize("local", [False, True])
+def test_a_position_that_no_file_could_have_is_refused(local: bool) -> None:  # noqa: FBT001
+    change = change_of("x", "+0.9e30 m")
+    moved = change_pose(Pose(), [change], local=local)
+    with pytest.raises(ChangeError):
+        change_pose(moved, [change], local=local)
 
 
 def changes_of(values: tuple[float, ...], *, relative: bool) -> list[PoseChange]:

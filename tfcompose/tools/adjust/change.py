@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.geometry import Pose, multiply, quat_from_rpy
 from tfcompose.foundation.units import (
     ANGLE,
+    LARGEST,
     LENGTH,
     NUMBER,
     UnitError,
@@ -45,7 +46,7 @@ def change_of(axis: str, text: str) -> PoseChange:
     """Return the change that a text means: ``+2mm`` and ``-2mm`` add, ``=2mm`` replaces.
 
     Raises:
-        ChangeError: if it is neither, or has no unit.
+        ChangeError: if it is neither, has no unit, or is too large.
     """
     dimension = ANGLE if axis in ANGLES else LENGTH
     sign, number = text.strip()[:1], text.strip().removeprefix("=")
@@ -57,7 +58,8 @@ def change_of(axis: str, text: str) -> PoseChange:
     try:
         value = quantity(number.replace("−", "-"), dimension)
     except UnitError as error:
-        raise ChangeError(f"--{axis} {text}: {error}; {error.advice}") from None
+        advice = f"; {error.advice}" if error.advice else ""
+        raise ChangeError(f"--{axis} {text}: {error}{advice}") from None
     if value.dimension == NUMBER and value.value:
         raise ChangeError(f"--{axis} {text} has no unit; write {sign}{example(dimension)}")
     if value.dimension not in {NUMBER, dimension}:
@@ -65,6 +67,8 @@ def change_of(axis: str, text: str) -> PoseChange:
         raise ChangeError(
             f"--{axis} {text}: give the {required}; write {sign}{example(dimension)}"
         )
+    if abs(value.value) > LARGEST:
+        raise ChangeError(f"--{axis} {text} is too large to compute with")
     return PoseChange(axis, value.value, relative=sign != "=")
 
 
@@ -73,6 +77,9 @@ def change_pose(pose: Pose, changes: Sequence[PoseChange], *, local: bool) -> Po
 
     Positions add along the parent's axes, and rotations about them, at the mount's origin: roll,
     then pitch, then yaw. With ``local`` the axes are the mount's own.
+
+    Raises:
+        ChangeError: if a file could not have the new position.
     """
     values = dict(zip(AXES, (*pose.xyz, *pose.rpy), strict=True))
     replaced = {change.axis: change.value for change in changes if not change.relative}
@@ -85,6 +92,10 @@ def change_pose(pose: Pose, changes: Sequence[PoseChange], *, local: bool) -> Po
     x, y, z, roll, pitch, yaw = (added.get(axis, 0.0) for axis in AXES)
     rotation = quat_from_rpy(roll, pitch, yaw)
     if local:
-        return pose @ Pose((x, y, z), rotation)
-    moved = (pose.xyz[0] + x, pose.xyz[1] + y, pose.xyz[2] + z)
-    return Pose(moved, multiply(rotation, pose.quat_xyzw))
+        new = pose @ Pose((x, y, z), rotation)
+    else:
+        moved = (pose.xyz[0] + x, pose.xyz[1] + y, pose.xyz[2] + z)
+        new = Pose(moved, multiply(rotation, pose.quat_xyzw))
+    if max(map(abs, new.xyz)) > LARGEST:
+        raise ChangeError("the new position is too large to compute with")
+    return new

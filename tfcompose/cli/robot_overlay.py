@@ -131,7 +131,9 @@ class RobotOverlay:
         )
         if joins and adjustments and adjustments[-1].tool == tool:
             first = adjustments.pop()
-            adjustment = replace(adjustment, replaced=first.replaced, before=first.before)
+            adjustment = replace(
+                adjustment, replaced=first.replaced, before=first.before, further=first.further
+            )
         values = self._values(mount, parent_from_child)
         new = self._with_pose(overlay, mount, values)
         text = self._render(new.with_history(mount.entry, [*adjustments, adjustment]))

@@ -76,6 +76,30 @@ CASES = {
         "sensors:\n  eye:\n    xyz: [1, 2, 3]\n    place: p\n    rpy: [0, 0, 5 deg]\n",
         "sensors:\n  eye:\n    place: p\n",
     ),
+    "comments in a list": (
+        (
+            "sensors:\n  eye:\n    xyz:   # m\n      # ahead\n      - 1  # x\n      - 2\n"
+            "      # up\n      - 3  # z\n    look: left\n    options: {serial: '# 12'}\n"
+        ),
+        (
+            "sensors:\n  eye:\n    # ahead\n    # x\n    # up\n    xyz: [1, 2, 3]  # m  # z\n"
+            "    rpy: [0, 0, 5 deg]\n    options: {serial: '# 12'}\n"
+        ),
+        (
+            "sensors:\n  eye:\n    # m\n    # ahead\n    # x\n    # up\n    # z\n"
+            "    options: {serial: '# 12'}\n"
+        ),
+    ),
+    "comments in braces": (
+        "sensors:\n  eye: {xyz: [0, # x\n    1, 2],\n    look: left, tf: driver}\n",
+        "sensors:\n  # x\n  eye: {xyz: [1, 2, 3],\n    rpy: [0, 0, 5 deg], tf: driver}\n",
+        "sensors:\n  # x\n  eye: {\n    tf: driver}\n",
+    ),
+    "a sign of comments in quotes": (
+        "sensors:\n  eye:\n    calibration: [{file: 'a # b'}]   # it's\n    xyz: [0, 0, 0]\n",
+        "sensors:\n  eye:\n    rpy: [0, 0, 5 deg]   # it's\n    xyz: [1, 2, 3]\n",
+        "# it's\ntfcompose: 1\n",
+    ),
     "no end of line": ("sensors:\n  eye:\n    look: left", ENTRY, "tfcompose: 1\n"),
 }
 SHARED = {
@@ -85,14 +109,81 @@ SHARED = {
 }
 
 
+@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
 @pytest.mark.parametrize("case", CASES)
-def test_a_pose_replaces_that_of_the_mount_alone(case: str) -> None:
-    before, with_pose, without = CASES[case]
+def test_a_pose_replaces_that_of_the_mount_alone(case: str, line_end: str) -> None:
+    if "\n" not in CASES[case][0]:
+        line_end = "\n"
+    before, with_pose, without = (text.replace("\n", line_end) for text in CASES[case])
     overlay = read_overlay(before, "o.yaml")
     assert overlay.with_pose(ENTRY_PATH, "o.yaml", POSE).render("o.yaml") == with_pose
     assert overlay.with_pose(ENTRY_PATH, "o.yaml", {}).render("o.yaml") == without
     again = read_overlay(with_pose, "o.yaml").with_pose(ENTRY_PATH, "o.yaml", POSE)
     assert again.render("o.yaml") == with_pose
+
+
+HISTORY = """\
+frames: {mast: {xyz: [0, 0, 1]}}
+
+x-adjustments:   # the poses that calibrate, nudge and prove replaced
+  # the first robot
+  sensors.eye:
+    - {date: a, tool: nudge, who: anna, replaced: {xyz: [0, 0, 0]}}   # at the fair
+    # after the crash
+# by hand
+    - date: b
+      tool: prove   # second
+      replaced: {xyz: [0, 0, 1]}
+  frames.mast:  # bent
+  - {tool: nudge, date: c, replaced: {}}
+  # the end
+"""
+#: Lines of the history, and those that replace them.
+HISTORY_EDITS = {
+    "add": {
+        "      replaced: {xyz: [0, 0, 1]}\n": (
+            "      replaced: {xyz: [0, 0, 1]}\n    - {date: d, tool: t, replaced: {}}\n"
+        )
+    },
+    "remove": {
+        "    - date: b\n      tool: prove   # second\n      replaced: {xyz: [0, 0, 1]}\n": (
+            "    # second\n"
+        )
+    },
+    "replace": {
+        "    - date: b\n      tool: prove   # second\n      replaced: {xyz: [0, 0, 1]}\n": (
+            "    # second\n    - {date: d, tool: t, replaced: {}}\n"
+        )
+    },
+}
+
+
+@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
+@pytest.mark.parametrize("edit", HISTORY_EDITS)
+def test_a_history_changes_in_the_lines_of_its_entry(edit: str, line_end: str) -> None:
+    overlay = read_overlay(HISTORY.replace("\n", line_end), "o.yaml")
+    before = overlay.adjustments(ENTRY_PATH)
+    assert before[0].further == {"who": "anna"}
+    new = [] if edit == "remove" else [OverlayChange("d", "t", {})]
+    kept = before if edit == "add" else before[:-1]
+    expected = HISTORY
+    for old, text in HISTORY_EDITS[edit].items():
+        expected = expected.replace(old, text)
+    edited = overlay.with_history(ENTRY_PATH, [*kept, *new]).render("o.yaml")
+    assert edited == expected.replace("\n", line_end)
+    assert read_overlay(edited, "o.yaml").adjustments(ENTRY_PATH) == (*kept, *new)
+
+
+@pytest.mark.parametrize("brace", ["{sensors.eye: [%s], b: []}", "{'sensors.eye': [%s]}  # mine"])
+def test_a_history_in_braces_keeps_its_keys_and_comments(brace: str) -> None:
+    item = "{date: a, tool: t, replaced: {}, who: anna}"
+    overlay = read_overlay(f"tfcompose: 1\nx-adjustments: {brace % item}\n", "o.yaml")
+    change = OverlayChange("d", "t", {})
+    rendered = overlay.with_history(("b",), [change]).render("o.yaml")
+    again = read_overlay(rendered, "o.yaml")
+    assert again.adjustments(ENTRY_PATH)[0].further == {"who": "anna"}
+    assert again.adjustments(("b",)) == (change,)
+    assert ("# mine" in rendered) == ("# mine" in brace)
 
 
 @pytest.mark.parametrize("case", SHARED)

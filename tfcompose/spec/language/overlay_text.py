@@ -1,7 +1,9 @@
 """Text of a robot's overlay: one mount's pose replaced, and the history of what it replaced.
 
-A mount's entry is edited in place; all other text stays as it is. The history is the last section,
-``x-adjustments``, which robot files may have and tfcompose does not read otherwise::
+A mount's entry and its history are edited in place; all other text stays as it is, with its
+comments and its line ends. Comments in a value that is replaced go above its key. The history is
+the last section, ``x-adjustments``, which robot files may have and tfcompose does not read
+otherwise::
 
     x-adjustments:
       sensors.eye:
@@ -11,7 +13,8 @@ A mount's entry is edited in place; all other text stays as it is. The history i
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import takewhile, zip_longest
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -30,8 +33,18 @@ if TYPE_CHECKING:
 #: The keys of an entry that a pose replaces.
 POSE_KEYS = ("calibration", "xyz", *sorted(ROTATIONS))
 HISTORY = "x-adjustments"
-_SECTION = re.compile(rf"^{HISTORY}:[^\n]*(?:\n(?:[ \t][^\n]*)?)*", re.MULTILINE)
-_COMMENT = re.compile(r"(?:^|\s)(#[^\r\n]*)", re.MULTILINE)
+#: A section ends before the next key. Comments at the margin belong to it if more of it follows.
+_MORE = r"(?:\n[ \t]*(?:#[^\n]*)?)*\n[ \t]+[^\s#]"
+_SECTION = re.compile(
+    rf"^{HISTORY}:[^\n]*(?:\n(?:[ \t][^\n]*|#[^\n]*(?={_MORE}))?)*", re.MULTILINE
+)
+_ABOUT = "# the poses that calibrate, nudge and prove replaced"
+_BARE_END = re.compile(r"(?<!\r)\n")
+_KEYS = frozenset({"date", "tool", "from", "replaced", "before"})
+#: Quoted text, or a comment, which is the group.
+_COMMENT = re.compile(
+    r"""(?<![^\s\[{,:])(?:"(?:[^"\\]|\\.)*"|'(?:[^']|'')*')|(?:^|\s)(#[^\n]*)""", re.MULTILINE
+)
 _ALIAS = re.compile(r"\s*\*[^\s,\]}]+")
 
 
@@ -53,6 +66,8 @@ class OverlayChange:
     source: str = ""
     #: The keys of the pose that the overlay had before; none if it had no pose of the mount.
     before: Mapping[str, Any] = field(default_factory=dict)
+    #: Further keys that the user added.
+    further: Mapping[str, Any] = field(default_factory=dict)
 
     def keys_before(self) -> dict[str, str]:
         """Return the keys of the pose that the overlay had before, as YAML."""
@@ -66,16 +81,23 @@ class OverlayChange:
         data["replaced"] = dict(self.replaced)
         if self.before:
             data["before"] = dict(self.before)
-        return data
+        return {**data, **self.further}
 
 
 @dataclass(frozen=True, slots=True)
 class OverlayText:
-    """An overlay's text without its history, and the history by the mount's entry."""
+    """An overlay's text without its history, and the history by the mount's entry.
+
+    In both texts, lines end with a line feed.
+    """
 
     text: str
     #: The oldest first, by the dotted path of the entry.
     history: Mapping[str, tuple[OverlayChange, ...]]
+    #: The text of the history; empty if there is none.
+    section: str = ""
+    #: The end of lines in the file.
+    line_end: str = "\n"
 
     def pose_of(self, entry: Path, file: str) -> dict[str, Any]:
         """Return the keys of a mount's pose in this overlay itself.
@@ -108,12 +130,22 @@ class OverlayText:
             same = False
         if not same:
             raise OverlayTextError(f"the entry {'.'.join(map(str, entry))} is not on its own")
-        return OverlayText(text, self.history)
+        return replace(self, text=text)
 
     def with_history(self, entry: Path, adjustments: Sequence[OverlayChange]) -> OverlayText:
         """Return the overlay with this history of a mount."""
-        history = {**self.history, _name(entry): tuple(adjustments)}
-        return OverlayText(self.text, {name: items for name, items in history.items() if items})
+        name, new = _name(entry), tuple(adjustments)
+        history = {**self.history, name: new}
+        history = {name: items for name, items in history.items() if items}
+        fresh = _history_text(history, _comments(self.section, 0, len(self.section)))
+        try:
+            section = _edit_history(self.section, name, self.adjustments(entry), new)
+            is_edited = _is_same(_history(section, ""), history)
+        except (RejectedError, yaml.YAMLError, LookupError, ValueError):  # not as written here
+            is_edited = False
+        section = section if is_edited else fresh
+        comments = {*_comments(section, 0, len(section))} - {_ABOUT}
+        return replace(self, history=history, section=section if history or comments else "")
 
     def adjustments(self, entry: Path) -> tuple[OverlayChange, ...]:
         """Return the history of a mount."""
@@ -125,10 +157,11 @@ class OverlayText:
         Raises:
             OverlayTextError: if a section cannot be added at its end.
         """
-        text = self._render()
+        text = self._render().replace("\n", self.line_end)
         try:
             load(text, file)
             same = _values(text).items() >= _values(self.text).items()
+            same = same and read_overlay(text, file).history.keys() == self.history.keys()
         except (RejectedError, yaml.YAMLError):
             same = False
         if not same:
@@ -139,12 +172,7 @@ class OverlayText:
         text = self.text if not self.text or self.text.endswith("\n") else f"{self.text}\n"
         if not _values(text):
             text += "tfcompose: 1\n"  # a file that holds nothing is no overlay
-        if not self.history:
-            return text
-        lines = [f"{HISTORY}:   # the poses that calibrate, nudge and prove replaced"]
-        for name, items in self.history.items():
-            lines += [f"  {flow(name)}:", *(f"    - {flow(item.as_data())}" for item in items)]
-        return text.rstrip("\n") + "\n\n" + "\n".join(lines) + "\n"
+        return text.rstrip("\n") + "\n\n" + self.section if self.section else text
 
 
 def read_overlay(text: str, file: str) -> OverlayText:
@@ -154,22 +182,95 @@ def read_overlay(text: str, file: str) -> OverlayText:
         OverlayTextError: if its history has another form.
         RejectedError: if it is not YAML.
     """
+    line_end = "\r\n" if "\n" in text and not _BARE_END.search(text) else "\n"
+    text = text.replace("\r\n", "\n") if line_end == "\r\n" else text
     section = _SECTION.search(text)
     if section is None:
-        return OverlayText(text, {})
+        return OverlayText(text, {}, line_end=line_end)
     rest = text[: section.start()].rstrip("\n") + "\n" + text[section.end() :]
     above = "\n" * text[: section.start()].count("\n")
-    data = load(f"{above}history:{section[0].removeprefix(f'{HISTORY}:')}", file).data["history"]
+    history = _history(section[0], file, above)
+    return OverlayText(rest.lstrip("\n"), history, section[0].rstrip() + "\n", line_end)
+
+
+def _history(section: str, file: str, above: str = "") -> dict[str, tuple[OverlayChange, ...]]:
+    """Return the history in a section, which is below the lines ``above``.
+
+    Raises:
+        OverlayTextError: if it has another form.
+        RejectedError: if it is not YAML.
+    """
+    if not section:
+        return {}
+    data = load(f"{above}history:{section.removeprefix(f'{HISTORY}:')}", file).data["history"]
     try:
-        history = {name: tuple(map(_adjustment, items)) for name, items in (data or {}).items()}
+        return {name: tuple(map(_adjustment, items)) for name, items in (data or {}).items()}
     except (AttributeError, KeyError, TypeError, ValueError):
         raise OverlayTextError(f"{HISTORY} was edited: remove it") from None
-    return OverlayText(rest.lstrip("\n"), history)
 
 
 def _adjustment(data: Mapping[str, Any]) -> OverlayChange:
-    replaced, before = dict(data["replaced"]), dict(data.get("before", {}))
-    return OverlayChange(data["date"], data["tool"], replaced, data.get("from", ""), before)
+    return OverlayChange(
+        date=data["date"],
+        tool=data["tool"],
+        replaced=dict(data["replaced"]),
+        source=data.get("from", ""),
+        before=dict(data.get("before", {})),
+        further={key: value for key, value in data.items() if key not in _KEYS},
+    )
+
+
+def _is_same(
+    history: Mapping[str, Sequence[OverlayChange]], expected: Mapping[str, Sequence[OverlayChange]]
+) -> bool:
+    """Return whether two histories have the same values in a file."""
+    texts = [
+        {name: [flow(item.as_data()) for item in items] for name, items in each.items()}
+        for each in (history, expected)
+    ]
+    return texts[0] == texts[1]
+
+
+def _history_text(history: Mapping[str, Sequence[OverlayChange]], comments: Sequence[str]) -> str:
+    """Return a new section with these comments, without those of its head."""
+    lines = [f"{HISTORY}:   {_ABOUT}", *(f"  {text}" for text in comments if text != _ABOUT)]
+    for name, items in history.items():
+        lines += [f"  {flow(name)}:", *(f"    - {flow(item.as_data())}" for item in items)]
+    return "\n".join(lines) + "\n"
+
+
+def _edit_history(
+    section: str, name: str, old: Sequence[OverlayChange], new: Sequence[OverlayChange]
+) -> str:
+    """Return a section in which the lines of a mount's changes are edited where they differ."""
+    added = _history_text({name: new}, []) if new else ""
+    if not section:
+        return added
+    root: Any = yaml.compose(section, Loader=yaml.BaseLoader)
+    mapping = root.value[0][1]
+    pairs = mapping.value if isinstance(mapping, yaml.MappingNode) else []
+    pair = next((each for each in pairs if each[0].value == name), None)
+    if pair is None:
+        return section + added.partition("\n")[2]
+    value = pair[1]
+    if not new:
+        return _apply(section, [_pair_removal(section, mapping, *pair)])
+    same = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False)))
+    indent, edits = " " * value.start_mark.column, []
+    for node, item in zip_longest(value.value[same:], new[same:]):
+        line = f"{indent}- {flow(item.as_data())}\n" if item else ""
+        last = node or value.value[-1]
+        end = section.find("\n", _end(last)) + 1 or len(section)
+        begin = section.rindex("\n", 0, last.start_mark.index) + 1 if node else end
+        comments = _comments(section, begin, end)
+        edits.append((begin, end, "".join(f"{indent}{text}\n" for text in comments) + line))
+    return _apply(section, edits)
+
+
+def _apply(text: str, edits: Sequence[tuple[int, int, str]]) -> str:
+    for begin, end, new in sorted(edits, reverse=True):
+        text = text[:begin] + new + text[end:]
+    return text
 
 
 def _name(entry: Path) -> str:
@@ -232,8 +333,7 @@ def _edit(text: str, file: str, entry: Path, pose: Mapping[str, str]) -> str:
     elif not isinstance(chain[-1], yaml.MappingNode) or not chain[-1].value:
         depth = len(chain) - 1  # an empty mapping or null: written anew
         edits = [_removal(text, chain[:depth], entry[:depth])]
-    for begin, end, new in sorted(edits, reverse=True):
-        text = text[:begin] + new + text[end:]
+    text = _apply(text, edits)
     return with_value(text, file, entry, rest) if rest else text
 
 
@@ -256,6 +356,11 @@ def _entry_edits(
         _, end, new = _replacement(text, old, value, rest.pop(key))
         edits.append((old.start_mark.index, end, f"{key}:{new}"))
     removed = stale[len(renamed) :]
+    edits += [
+        _comments_above(text, node, *pair)
+        for key, pair in existing.items()
+        if key in POSE_KEYS and (node.flow_style or pair not in removed)
+    ]
     return [*edits, *(_pair_removal(text, node, *pair) for pair in removed)], rest
 
 
@@ -278,11 +383,33 @@ def _child(node: Any, name: str) -> Any:
 def _replacement(text: str, key: Any, value: Any, new: str) -> tuple[int, int, str]:
     """Return the edit that replaces everything behind a key's colon by a value on its line.
 
-    A comment between the two remains.
+    A comment behind the colon remains.
     """
     begin, end = text.index(":", key.end_mark.index) + 1, _value_end(text, key, value)
-    between = text[begin : max(begin, value.start_mark.index)].rstrip()
+    between = text[begin : _line_end(text, key, value)].rstrip()
     return begin, end, f" {new}" + (f"  {between.lstrip()}" if "#" in between else "")
+
+
+def _comments_above(text: str, node: Any, key: Any, value: Any) -> tuple[int, int, str]:
+    """Return the edit that puts the comments inside a value above its key, or its braces."""
+    line = text.rfind("\n", 0, (node if node.flow_style else key).start_mark.index) + 1
+    rest = text[line:]
+    indent = rest[: len(rest) - len(rest.lstrip(" "))]
+    comments = _comments(text, _line_end(text, key, value), _value_end(text, key, value))
+    return line, line, "".join(f"{indent}{comment}\n" for comment in comments)
+
+
+def _line_end(text: str, key: Any, value: Any) -> int:
+    """Return where the line of a key ends, or the value begins in it."""
+    begin = text.index(":", key.end_mark.index) + 1
+    start = max(begin, int(value.start_mark.index))
+    line_end = text.find("\n", begin, start)
+    return start if line_end < 0 else line_end
+
+
+def _comments(text: str, begin: int, end: int) -> list[str]:
+    """Return the comments in a part of YAML text."""
+    return [match[1] for match in _COMMENT.finditer(text, begin, end) if match[1]]
 
 
 def _value_end(text: str, key: Any, value: Any) -> int:
@@ -309,6 +436,6 @@ def _pair_removal(text: str, node: Any, key: Any, value: Any) -> tuple[int, int,
         earlier = re.compile(r"\s*,\s*\Z").search(text[:begin])
         return (earlier.start() if earlier else begin), end, ""
     line_end = text.find("\n", end) + 1 or len(text)
-    comments = [match[1] for match in _COMMENT.finditer(text, begin, line_end)]
+    comments = _comments(text, begin, line_end)
     indent = " " * key.start_mark.column
     return begin - len(indent), line_end, "".join(f"{indent}{line}\n" for line in comments)

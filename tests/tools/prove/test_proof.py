@@ -76,7 +76,7 @@ def lacks(quantity: str, value: float, covariance: float) -> Fault:
     return change
 
 
-@pytest.mark.parametrize(("value", "covariance"), [(0.0, -1.0), (np.nan, 0.0)])
+@pytest.mark.parametrize(("value", "covariance"), [(0.0, -1.0), (np.nan, 0.0), (1e300, 0.0)])
 @pytest.mark.parametrize(
     ("quantity", "judged_by"),
     [("linear_acceleration", {"yaw rate"}), ("angular_velocity", {"gravity", "heading"})],
@@ -180,3 +180,14 @@ def test_frames_that_share_a_topic_are_not_judged_as_one(
     assert verdict.judgement.code == code
     assert verdict.judgement.answer == ("differs" if code else "cannot tell")
     assert f"{sensor}_link and {second}" in verdict.judgement.text
+
+
+def test_a_sensor_on_the_topic_of_another_has_sent_messages(drive: Drive) -> None:
+    def share(message: Any, count: int) -> None:
+        if count % 5 == 0:
+            message.header.frame_id = "rear_link"
+
+    messages = [each for each in drive.sent if each[0] == "/front/points"]
+    (verdict,) = drive.prove(messages, ["rear"], PointCloud2=share).values()
+    assert verdict.judgement.answer == "cannot tell"
+    assert "/front/points" in verdict.judgement.text

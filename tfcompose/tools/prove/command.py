@@ -229,8 +229,7 @@ def _fix_overlay(
 
     name = arguments.overlay or arguments.overlay_robot
     origin = arguments.bag or "the running robot"
-    fixed, tried, refused = [], set(), []
-    placed: set[str] = set()
+    fixed, refused, tried, placed = [], [], set(), set()
     try:
         overlay = edited = RobotOverlay.open(arguments.file, arguments, name, day)
         verdicts = prove(edited)
@@ -245,9 +244,7 @@ def _fix_overlay(
             except RejectedError as error:
                 refused += [entry for entry in error.findings if entry not in refused]
                 continue
-            if text is None:
-                continue
-            changed = replace(edited, text=text)
+            changed = replace(edited, text=text or edited.text)
             after = prove(changed)
             if problem and len(findings_of(after)) < len(findings_of(verdicts)):
                 fixed.append(problem)

@@ -57,14 +57,13 @@ def judge_frame(
 
 
 def _judge_frames(topic: MeasuredTopic, declared: str, finals: Mapping[str, str]) -> CheckResult:
-    """Return the result for a topic on which messages of different frames come.
+    """Return the result for a topic on which messages of different frames come, most first.
 
     Clouds of different sensors may share a topic.
     """
-    order = sorted(topic.frames, key=lambda name: (-topic.frames[name], name))
-    frames = [frame or "(empty)" for frame in order]
-    named = f"has frame_id {' and '.join(frames)}"
-    if topic.type in CLOUDS and not declared and finals.keys() >= {*frames}:
+    counts = sorted((-count, frame) for frame, count in topic.frames.items())
+    named = f"has frame_id {' and '.join(frame or '(empty)' for _, frame in counts)}"
+    if topic.type in CLOUDS and not declared and finals.keys() >= topic.frames.keys():
         return CheckResult(CHECK, "cannot tell", f"{topic.name} {named}")
     advice = "let each driver use its own topic, and the frame that the file declares"
     return CheckResult(CHECK, "differs", f"{named} on {topic.name}", "TF652", advice)

@@ -166,7 +166,6 @@ class ImuCheck:
                 " (REP-103)"
             )
         yield CheckResult(check, "differs", text, "TF651", advice, values=values)
-        return
 
     def _judge_heading(self) -> Iterator[CheckResult]:
         """Yield the result for the direction of accelerations.
@@ -200,7 +199,6 @@ class ImuCheck:
         yield CheckResult(
             "heading", "differs", text, "TF650", base_from_frame_xyzw=rotation, values=values
         )
-        return
 
     def _fit(self, up: Estimate) -> tuple[Quaternion | None, str]:
         """Return the fitting rotation of the frame in the base, or why there is none."""

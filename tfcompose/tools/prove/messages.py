@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
+from tfcompose.foundation.units import LARGEST
 from tfcompose.tools.prove.clouds import EVERY_S, Cloud, cloud_of
 
 if TYPE_CHECKING:
@@ -115,9 +116,9 @@ def imu_of(topic: MeasuredTopic) -> Imu:
 
 
 def odometry_of(topic: MeasuredTopic) -> Odometry:
-    """Return the finite measurements of a topic with odometry."""
+    """Return the measurements of a topic with odometry that are not too large."""
     rows = np.array(topic.rows, dtype=np.float64).reshape(-1, 4)
-    rows = _in_order(rows[np.isfinite(rows).all(axis=1)])
+    rows = _in_order(rows[(np.abs(rows) <= LARGEST).all(axis=1)])
     return Odometry(rows[:, 0], rows[:, 1:3], rows[:, 3])
 
 

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tfcompose.foundation.units import LARGEST
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -125,9 +127,9 @@ def _yaw_axis(imu: Imu, odometry: Odometry | None) -> Estimate | str:
 
 
 def _measured(stamps_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return the stamps with finite values, and these values."""
-    is_finite = np.isfinite(values).all(axis=1)
-    return stamps_s[is_finite], values[is_finite]
+    """Return the stamps with values to compute with, and these values."""
+    is_usable = (np.abs(values) <= LARGEST).all(axis=1)
+    return stamps_s[is_usable], values[is_usable]
 
 
 def _why_few(imu: Imu, count: int, quantity: str) -> str:

@@ -75,7 +75,7 @@ class Proof:
         received = {verdict.sensor for verdict in verdicts}
         verdicts += self._overlaps(verdicts, poses, odometry)
         verdicts += [
-            SensorVerdict(name, "", CheckResult("data", "cannot tell", "no message came"))
+            SensorVerdict(name, "", CheckResult("data", "cannot tell", self._why_missing(name)))
             for name in sorted(self._only or {sensor.name for sensor in self._measuring()})
             if name not in received
         ]
@@ -122,8 +122,20 @@ class Proof:
     def _sensor_name(self, name: str) -> str:
         """Return the sensor's name for that of its frame; other names stay as they are."""
         sensor = self._sensor_of(name)
-        is_frame = all(each.name != name for each in self.robot.sensors)
-        return sensor.name if sensor and is_frame else name
+        names = {each.name for each in self.robot.sensors}
+        return sensor.name if sensor and name not in names else name
+
+    def _why_missing(self, name: str) -> str:
+        """Return why there are no measurements of a sensor."""
+        shared = (
+            topic.name
+            for topic in self.measurements.topics.values()
+            for frame in self.robot.frames
+            if self.robot.final(frame) in topic.frames and self._sensor_name(frame) == name
+        )
+        topic_name = next(shared, None)
+        reason = f"its messages on {topic_name} come with those of other frames"
+        return reason if topic_name else "no message came"
 
     def _frame_of(self, topic: MeasuredTopic) -> str:
         """Return the declared frame of a topic's messages; empty if there is none."""

@@ -511,6 +511,8 @@ def test_a_bag_or_file_that_cannot_be_used_is_a_finding(
     done = tfcompose_in(folder, "rebag", *words, "--with", "cart.yaml")
     assert done.returncode in {1, 2}
     assert f"error[{code}]" in done.stderr
+    if words[1] in {"right", "right.db3"} and words[0].startswith("drive/"):
+        assert "right.mcap" in done.stderr
     assert "Traceback" not in done.stderr
     assert {each.name for each in folder.iterdir()} == before
 

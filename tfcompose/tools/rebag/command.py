@@ -201,13 +201,15 @@ def _corrected(path: Path, target: Path | None, rewrite: Rewrite) -> Counter[str
     Raises:
         BagError: if the bag is damaged. OSError: if the new bag cannot be written.
     """
+    from tfcompose.tf.bags import ENDINGS
     from tfcompose.tools.rebag.bag import bag_at, check_bag, note_static, write_corrected
     from tfcompose.tools.rebag.rewriting import InterruptedRewrite
 
     bag = bag_at(path)
     if target is not None and bag.information is None and target.suffix != path.suffix:
-        name = target.name + path.suffix
-        reject([_unwritable(str(target), f"{path} is a single file", f"name it {name}")])
+        name = target.stem if target.suffix in ENDINGS else target.name
+        reason = f"{path} is a file {path.suffix}, and so is its copy"
+        reject([_unwritable(str(target), reason, f"name it {name}{path.suffix}")])
     try:
         note_static(bag, rewrite)
         _refuse_other_types(rewrite)
